@@ -1,10 +1,13 @@
 # Run by ctest at its start, for an executable of many files: a test for each suite (TEST(suite, case)), whose cases
 # share pipelines, which take longer to make than they run. EXECUTABLE.SUITE is its name; cases whose own names end in
-# _slow or _long are tests beside it, EXECUTABLE.SUITE_slow and EXECUTABLE.SUITE_long. Wants EXECUTABLE, PROPERTIES.
+# _slow or _long are tests beside it, EXECUTABLE.SUITE_slow and EXECUTABLE.SUITE_long. Wants EXECUTABLE, KIND and
+# PROPERTIES; labels.cmake has the labels.
 get_filename_component(name "${EXECUTABLE}" NAME_WE)
+include("${CMAKE_CURRENT_LIST_DIR}/labels.cmake")
 if(NOT EXISTS "${EXECUTABLE}")
   add_test("${name}_is_not_built" "${EXECUTABLE}")
-  set_tests_properties("${name}_is_not_built" PROPERTIES ${PROPERTIES})
+  darb_labels(labels "${name}_is_not_built" ${KIND})
+  set_tests_properties("${name}_is_not_built" PROPERTIES LABELS "${labels}" ${PROPERTIES})
   return()
 endif()
 execute_process(COMMAND "${EXECUTABLE}" --gtest_list_tests OUTPUT_VARIABLE listed RESULT_VARIABLE failed TIMEOUT 60)
@@ -38,5 +41,6 @@ foreach(test IN LISTS each)
   list(FILTER cases INCLUDE REGEX "^${test}$")
   list(LENGTH cases count)
   add_test("${name}.${test}" "${EXECUTABLE}" "--gtest_filter=${filter}")
-  set_tests_properties("${name}.${test}" PROPERTIES COST ${count} ${PROPERTIES})  # the longest begin first
+  darb_labels(labels "${name}.${test}" ${KIND})
+  set_tests_properties("${name}.${test}" PROPERTIES COST ${count} LABELS "${labels}" ${PROPERTIES})  # the longest begin first
 endforeach()

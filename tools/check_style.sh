@@ -1,23 +1,32 @@
 #!/usr/bin/env bash
-# Include arrows, guards of the hard cases and layout of every source file, and the links of every page; prints each
-# violation.
-#   tools/check_style.sh [--fix] [ROOT]      --fix: let clang-format rewrite the files
+# Include arrows and layout of every source file, and the links of every page; prints each violation.
+#   tools/check_style.sh [--fix | --tidy] [ROOT]
+#     --fix    let clang-format rewrite the files
+#     --tidy   clang-tidy instead, on every file of build-clang or build (minutes); .clang-tidy has its checks
 set -uo pipefail
 case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
-fix=0
+fix=0 tidy=0
 [[ ${1:-} == --fix ]] && { fix=1; shift; }
+[[ ${1:-} == --tidy ]] && { tidy=1; shift; }
 here=$(cd "$(dirname "$0")" && pwd)
 cd "${1:-$here/..}" || exit 2
 
 failed=0
 
+if [[ $tidy == 1 ]]; then
+    cmake -S . -B build-tidy -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
+        -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DDARB_TESTS=OFF >/dev/null || exit 1
+    cmake --build build-tidy --target darb_shaders >/dev/null || exit 1 # headers that are made
+    git ls-files 'engine/*.cpp' 'trainer/*.cpp' 'viewer/*.cpp' 'tools/*.cpp' |
+        xargs -P "$(nproc)" -n 8 clang-tidy-14 -p build-tidy --quiet --warnings-as-errors='*' 2>/dev/null || exit 1
+    echo "tidy: clean"
+    exit 0
+fi
+
 python3 "$here/check_includes.py" . || failed=1
 python3 "$here/links.py" --root . || failed=1
 # python3 "$here/spdx.py" --root . --check || failed=1    # to be enabled once tools/spdx.py has written the lines
-[[ ! -f tools/guards.py ]] || python3 tools/guards.py check || failed=1
-[[ ! -f tools/price_of_determinism.py ]] || python3 tools/price_of_determinism.py --check || failed=1
-[[ ! -f tools/new_attribute.py ]] || python3 tools/new_attribute.py --check || failed=1
 
 folders=()
 for folder in engine trainer viewer tools examples tests shaders; do

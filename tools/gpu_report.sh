@@ -84,8 +84,8 @@ if compgen -G '/usr/share/vulkan/explicit_layer.d/*validation*' >/dev/null && [[
     # The layer's messages end no run.
     grep -q 'vulkan.validation:' "$out/validation.txt" && sed -i 's/^validation\tok/validation\tFAILED/' "$out/steps.txt"
 fi
-if [[ -s $out/passes.json ]]; then step model 2 python3 -B "$here/tools/gpu_model.py" "$out/passes.json"; fi
-python3 -B "$here/tools/gpu_report_page.py" "$out" ${photos:+"$photos"} || exit 1
+if [[ -s $out/passes.json ]]; then step model 2 python3 -B "$here/tools/lab/gpu_model.py" "$out/passes.json"; fi
+python3 -B "$here/tools/lab/gpu_report_page.py" "$out" ${photos:+"$photos"} || exit 1
 find "$out" -name 'checkpoint*' -delete
 tar -C "$(dirname "$out")" -czf "$out.tar.gz" "$(basename "$out")"
 echo "the page: $out/index.html"

@@ -1,4 +1,4 @@
-// What is known of a format of splat files: its row in the table of splat_format_list.h. Only the
+// What is known of a format of splat files: its row in the table of splat_file.h. Only the
 // formats themselves and splat_file.cpp include this.
 #pragma once
 
@@ -59,30 +59,5 @@ DARB_SPLAT_FORMATS(DARB_SPLAT_FORMAT)
 
 /// Whether the bytes begin with the text.
 bool starts_with(std::span<const std::byte> bytes, std::string_view text);
-
-}  // namespace darb
-
-// The table of splat formats, and the only switch between them. A row is a name: the file that
-// reads or writes the format defines `const SplatFormatRow& <name>_format()`, all that is known of
-// it (splat_format.h). The order is that in which content is recognised: .splat, which has nothing
-// to know it by, comes last.
-
-#define DARB_SPLAT_FORMATS(ROW) \
-    ROW(ply)                    \
-    ROW(compressed_ply)         \
-    ROW(spz)                    \
-    ROW(gltf)                   \
-    ROW(streamed_sog)           \
-    ROW(sog)                    \
-    ROW(ksplat)                 \
-    ROW(dot_splat)
-
-namespace darb {
-
-enum class SplatFormat {
-#define DARB_SPLAT_FORMAT(name) name,
-    DARB_SPLAT_FORMATS(DARB_SPLAT_FORMAT)
-#undef DARB_SPLAT_FORMAT
-};
 
 }  // namespace darb

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# tools/bench_compare.py on made-up results: what it calls faster, slower and noise.
+# tools/lab/bench_compare.py on made-up results: what it calls faster, slower and noise.
 set -uo pipefail
 script=$(cd "$(dirname "$0")/../../tools" && pwd)/bench_compare.py
 # shellcheck source=check.sh

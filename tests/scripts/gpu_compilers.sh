@@ -1,21 +1,21 @@
 #!/usr/bin/env bash
-# tools/gpu_compilers.py: AMD's compiler takes every pass within the tracked table, and a worse pass is found.
-# Skips (77) where Mesa's drivers are not unpacked (tools/gpu_compilers.py fetch) or darb is not built.
+# tools/lab/gpu_compilers.py: AMD's compiler takes every pass within the tracked table, and a worse pass is found.
+# Skips (77) where Mesa's drivers are not unpacked (tools/lab/gpu_compilers.py fetch) or darb is not built.
 #   gpu_compilers.sh BUILD
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 build=$1 dir=${DARB_GPU_COMPILERS:-$1/gpu_compilers}
 if [[ ! -e $dir/bookworm-backports-radeon.json ]]; then
-    echo "skipped: no AMD driver below $dir; get it with: tools/gpu_compilers.py fetch $dir"
+    echo "skipped: no AMD driver below $dir; get it with: tools/lab/gpu_compilers.py fetch $dir"
     exit 77
 fi
-tools/gpu_compilers.py check "$dir" --darb "$build/darb"
+tools/lab/gpu_compilers.py check "$dir" --darb "$build/darb"
 worse=$(mktemp -d)
 trap 'rm -rf "$worse"' EXIT
 mkdir -p "$worse/tools" "$worse/assets/results"
-cp tools/gpu_compilers.py "$worse/tools"
+cp tools/lab/gpu_compilers.py "$worse/tools"
 sed 's/"registers": 48.0/"registers": 47.0/' assets/results/gpu_passes.json >"$worse/assets/results/gpu_passes.json"
-if "$worse/tools/gpu_compilers.py" check "$dir" navi31 --again --darb "$build/darb" >"$worse/out"; then
+if "$worse/tools/lab/gpu_compilers.py" check "$dir" navi31 --again --darb "$build/darb" >"$worse/out"; then
     echo "a pass that takes a register more than the table was not found"
     exit 1
 fi

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# tools/hostile.sh: a case passes, and a command that spoils its input, writes an escape sequence or ends
+# tools/lab/hostile.sh: a case passes, and a command that spoils its input, writes an escape sequence or ends
 # by a signal is found, with the line that repeats it.
 set -uo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
@@ -8,10 +8,10 @@ darb=${DARB:-$root/build/darb}
 # shellcheck source=check.sh
 source "$(dirname "$0")/check.sh"
 
-check help 'tools/hostile.sh .*HOURS|hours' "$("$root/tools/hostile.sh" --help)"
-check 'hours are asked for' 'give HOURS' "$("$root/tools/hostile.sh" 2>&1)"
+check help 'tools/lab/hostile.sh .*HOURS|hours' "$("$root/tools/lab/hostile.sh" --help)"
+check 'hours are asked for' 'give HOURS' "$("$root/tools/lab/hostile.sh" 2>&1)"
 
-text=$(DARB=$darb "$root/tools/hostile.sh" 0 --only mutations --seed 3 --out "$folder/whole" 2>&1)
+text=$(DARB=$darb "$root/tools/lab/hostile.sh" 0 --only mutations --seed 3 --out "$folder/whole" 2>&1)
 check 'a case' '^1 executions in [0-9.]+ h, 0 findings' "$text"
 check 'the summary in JSON' '"executions": 1' "$(cat "$folder/whole/hostile.json")"
 
@@ -24,9 +24,9 @@ esac
 exec "$darb" "\$@"
 TEXT
 chmod +x "$folder/darb"
-text=$(DARB=$folder/darb "$root/tools/hostile.sh" 0 --seed 3 --only mutations --out "$folder/spoilt" 2>&1)
+text=$(DARB=$folder/darb "$root/tools/lab/hostile.sh" 0 --seed 3 --only mutations --out "$folder/spoilt" 2>&1)
 check 'a signal is found' 'mutations: signal SIGSEGV' "$text"
 check 'a spoilt input is found' 'mutations: file changed' "$text"
 check 'an escape sequence is found' 'mutations: control characters' "$text"
-check 'the repeating line' 'tools/hostile.sh --only mutations --seed 3 --case 0' "$text"
+check 'the repeating line' 'tools/lab/hostile.sh --only mutations --seed 3 --case 0' "$text"
 exit "$failed"

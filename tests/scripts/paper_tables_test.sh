@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# tools/paper_tables.sh on a made-up ROOT: which scenes and sizes it hands to darb compare.
+# tools/lab/paper_tables.sh on a made-up ROOT: which scenes and sizes it hands to darb compare.
 set -uo pipefail
 script=$(cd "$(dirname "$0")/../../tools" && pwd)/paper_tables.sh
 # shellcheck source=check.sh

@@ -33,13 +33,17 @@ train 2 "$folder/two" "${run[@]}" --iterations 30
 same 'two ranks leave what one leaves' "$folder/one" "$folder/two" 30
 for ranks in 1 2; do train "$ranks" "$folder/grid.$ranks" -r 50 --exposure-grid --iterations 12; done
 same 'two ranks train the grids of exposure that one trains' "$folder/grid.1" "$folder/grid.2" 12
-"$build/make_scene" depths "$folder/scene_with_depths"
-for ranks in 1 2; do
-    data=$folder/scene_with_depths train "$ranks" "$folder/depth.$ranks" -r 50 --iterations 12 --effects +depth
-done
-train 1 "$folder/colour" -r 50 --iterations 12
-same 'two ranks train by the depths that one trains by' "$folder/depth.1" "$folder/depth.2" 12
-[[ $(scene "$folder/depth.1" 12) != $(scene "$folder/colour" 12) ]] || { echo 'FAILED  depths changed nothing'; failed=1; }
+if [[ -x $build/make_scene ]]; then
+    "$build/make_scene" depths "$folder/scene_with_depths"
+    for ranks in 1 2; do
+        data=$folder/scene_with_depths train "$ranks" "$folder/depth.$ranks" -r 50 --iterations 12 --effects +depth
+    done
+    train 1 "$folder/colour" -r 50 --iterations 12
+    same 'two ranks train by the depths that one trains by' "$folder/depth.1" "$folder/depth.2" 12
+    [[ $(scene "$folder/depth.1" 12) != $(scene "$folder/colour" 12) ]] || { echo 'FAILED  depths changed nothing'; failed=1; }
+else
+    echo 'skipped  training by depths: the build has no make_scene (-DDARB_LAB=ON)'
+fi
 for ranks in 1 2; do
     mpirun -n "$ranks" "$darb" eval "$folder/one" "$data" -r 50 -q --json "$folder/eval.$ranks" >"$folder/eval.log" 2>&1
 done

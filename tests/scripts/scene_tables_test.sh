@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# tools/scene_tables.py on a made-up report: what it keeps and writes, kernels that failed included.
+# tools/lab/scene_tables.py on a made-up report: what it keeps and writes, kernels that failed included.
 set -uo pipefail
 # shellcheck source=check.sh
 source "$(dirname "$0")/check.sh"
@@ -34,7 +34,7 @@ TEXT
 marks=("<!-- the tables of blending -->" "<!-- end of the tables of blending -->" between
     "<!-- the tables of the data sets -->" "<!-- end of the tables of the data sets -->" after)
 printf '%s\n' "${marks[@]}" >"$page"
-check "runs" '^0$' "$("$folder/tools/scene_tables.py" "Title.=$folder/compare.json" 2>&1; echo $?)"
+check "runs" '^0$' "$("$folder/tools/lab/scene_tables.py" "Title.=$folder/compare.json" 2>&1; echo $?)"
 text=$(cat "$page")
 check "best in bold" '^\| set \| gaussian \| 20\.50, 0\.5000 \| \*\*25\.25\*\*, 0\.7500 \| 12,345 \| 60 \|$' "$text"
 check "an iteration that failed" '^\|  \| sinc \| \*\*21\.50\*\*, 0\.5000 \| - \| - \| - \|$' "$text"
@@ -44,11 +44,11 @@ check "blending" '^\| gaussian \| 30\.5, 2\.54, 10\.0 \|$' "$text"
 check "text between the tables" '^between$' "$text"
 check "memory and blending are kept" '"peak_mb": \[36\.7, 36\.7, 36\.7\].*"ns_per_splat_pixel": 4\.62' \
     "$(tr '\n' ' ' <"$figures")"
-check "again without a report" '^0$' "$("$folder/tools/scene_tables.py" 2>&1; echo $?)"
+check "again without a report" '^0$' "$("$folder/tools/lab/scene_tables.py" 2>&1; echo $?)"
 check "which writes the same page" "^same$" "$([[ $text == "$(cat "$page")" ]] && echo same)"
 before=$(cat "$figures")
 echo "no marks" >"$page"
 check "a page without marks" "has no <!-- the tables of blending -->" \
-    "$("$folder/tools/scene_tables.py" "Other.=$folder/compare.json" 2>&1)"
+    "$("$folder/tools/lab/scene_tables.py" "Other.=$folder/compare.json" 2>&1)"
 check "which changes nothing" "^same$" "$([[ $before == "$(cat "$figures")" ]] && echo same)"
 exit "$failed"

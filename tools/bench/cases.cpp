@@ -559,7 +559,7 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     return result;
 }
 
-// What tools/gpu_model.py estimates. Rates so small that the scene stays as it is.
+// What tools/lab/gpu_model.py estimates. Rates so small that the scene stays as it is.
 BenchResult measure_filled(Device& device, const DeviceRates& rates, const BenchOptions& options) {
     Dataset dataset;
     std::vector<ImageU8> photos;

@@ -103,43 +103,5 @@ TEST(SplatAttributes, arrays_that_do_not_fit_are_named) {
     }
 }
 
-// Rotations and colours have no rules of their own: who carries attributes says neither. A file
-// that is moved is to be named anew here; one that computes with an attribute does not belong here.
-TEST(SplatAttributes, what_only_carries_them_names_none) {
-    const std::regex named(
-        R"(kRotation|kShDc|\bsh_dc\b|f_dc|rot_|(model|splats)\.rotation\b|E_ROTATION|SH_DC)");
-    for (const char* file : {"engine/scene/ply.cpp",
-                             "engine/scene/splat_shapes.cpp",
-                             "engine/scene/splat_model.h",
-                             "engine/check/dump.cpp",
-                             "engine/check/device_walk.cpp",
-                             "engine/check/device_walk.cpp",
-                             "engine/raster/gpu_splats.h",
-                             "engine/raster/gpu_splats.cpp",
-                             "engine/raster/forward.cpp",
-                             "engine/raster/backward.h",
-                             "engine/raster/backward.cpp",
-                             "engine/raster/adam.h",
-                             "engine/raster/adam.cpp",
-                             "engine/raster/adam.h",
-                             "engine/raster/adam.cpp",
-                             "engine/raster/gradient_buffers.h",
-                             "engine/raster/gradient_buffers.cpp",
-                             "engine/plan/roofline.cpp",
-                             "engine/reference/splats.h",
-                             "trainer/step/checkpoint.cpp",
-                             "trainer/step/iterate_average.cpp",
-                             "trainer/step/memory_plan.cpp",
-                             "shaders/optim/adam_update.comp",
-                             "shaders/optim/add_gradients.comp",
-                             "shaders/densify/gather_attribute.comp"}) {
-        const std::vector<std::byte> bytes =
-            read_file(std::filesystem::path(DARB_SOURCE_DIR) / file);
-        const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-        std::smatch found;
-        EXPECT_FALSE(std::regex_search(text, found, named)) << file << " says " << found.str();
-    }
-}
-
 }  // namespace
 }  // namespace darb

@@ -1,4 +1,4 @@
-// What is left of a run, on runs whose pace was recorded (tools/record_pace.py).
+// What is left of a run, on runs whose pace was recorded (tools/lab/record_pace.py).
 #include "trainer/run/time_left.h"
 
 #include <gtest/gtest.h>

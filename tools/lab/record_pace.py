@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The pace of training runs as the test of the time left wants it, from their output folders.
 
-  tools/record_pace.py OUT NAME...    writes tests/unit/trainer/pace/NAME.json from OUT/NAME/run.jsonl
+  tools/lab/record_pace.py OUT NAME...    writes tests/unit/trainer/pace/NAME.json from OUT/NAME/run.jsonl
 
 Run it on runs that darb train made on one device, with a forecast (200 iterations or more, not -q), such as
 
@@ -37,7 +37,7 @@ def main():
     if len(sys.argv) < 3 or sys.argv[1] in ("-h", "--help"):
         print(__doc__.strip())
         return 0 if "--help" in sys.argv or "-h" in sys.argv else 2
-    folder = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "tests", "unit", "trainer", "pace")
+    folder = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tests", "unit", "trainer", "pace")
     os.makedirs(folder, exist_ok=True)
     for name in sys.argv[2:]:
         with open(os.path.join(folder, name + ".json"), "w", encoding="utf-8") as file:

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """The guards of the hard cases: which line of the sources holds each, and which test watches it.
 
-    tools/guards.py check               strings and tests exist, docs/hard_cases.md says the same
-    tools/guards.py docs                rewrites its table, and those of docs/experiments/float32.md from
-                                        assets/results/truth_lavapipe.json (tools/truth_figures.py)
-    tools/guards.py run [NAME...]       disables each guard in turn in a copy of the sources (build-guards)
+    tools/lab/guards.py check               strings and tests exist, docs/hard_cases.md says the same
+    tools/lab/guards.py docs                rewrites its table, and those of docs/experiments/float32.md from
+                                        assets/results/truth_lavapipe.json (tools/lab/truth_figures.py)
+    tools/lab/guards.py run [NAME...]       disables each guard in turn in a copy of the sources (build-guards)
                                         and fails unless the named test turns red; minutes
 """
 
@@ -17,7 +17,7 @@ import sys
 
 import truth_figures
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 CASES, FIGURES = "docs/hard_cases.md", "docs/experiments/float32.md"
 COPY = "build-guards"
 
@@ -263,11 +263,11 @@ def check():
     for page, tables in all_tables().items():
         for name, table in tables.items():
             if between(read(page), name) != table:
-                problems.append(f"{page}: the table of {name} is out of date; run tools/guards.py docs")
+                problems.append(f"{page}: the table of {name} is out of date; run tools/lab/guards.py docs")
     errors = between(read(FIGURES), "errors")
     for name in re.findall(r'add\(\s*"(\w+)"', read("engine/check/hard_cases.cpp")):
         if f"| {name}" not in errors:
-            problems.append(f"{FIGURES}: no errors of the case {name}; see tools/truth_figures.py")
+            problems.append(f"{FIGURES}: no errors of the case {name}; see tools/lab/truth_figures.py")
     print("\n".join(problems) or f"guards: {len(GUARDS)}, all in place")
     return 1 if problems else 0
 

@@ -12,7 +12,7 @@ import sys
 
 import gpu_model
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:64rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.2rem .8rem;border-bottom:1px solid #ddd;text-align:left}
 td+td,th+th{text-align:right}pre{background:#f6f6f6;padding:1rem;overflow:auto;font-size:12px}img{max-width:100%}

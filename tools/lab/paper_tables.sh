@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The paper's Tables 1 and 2: its 13 scenes, 5 kernels, 7,000 and 30,000 iterations, at the sizes of 3DGS:
 # outdoor scenes of Mip-NeRF 360 from images_4, indoor ones from images_2, the others at most 1,600 px wide.
-#   tools/paper_tables.sh ROOT OUT [options of darb compare...]
+#   tools/lab/paper_tables.sh ROOT OUT [options of darb compare...]
 # ROOT holds the scenes' folders, at any depth up to three: bicycle flowers garden stump treehill room counter
 # kitchen bonsai truck train drjohnson playroom. Missing ones are named and left out. Runs again go on. The schedule is
 # that of 3DGS, as the paper's, unless --train-options names another --schedule.
@@ -15,7 +15,7 @@ fi
 root=$1 out=$2
 shift 2
 [[ -d $root ]] || { echo "paper_tables.sh: $root is no folder" >&2; exit 2; }
-darb=${DARB:-$(cd "$(dirname "$0")/.." && pwd)/build/darb}
+darb=${DARB:-$(cd "$(dirname "$0")/../.." && pwd)/build/darb}
 [[ -x $darb ]] || { echo "paper_tables.sh: $darb is not built; name another with DARB=" >&2; exit 2; }
 
 datasets=() missing=()

@@ -5,7 +5,7 @@
 
 Sizes are read with Universal Ctags (Debian: universal-ctags). The files of a change are those that name the last thing
 of its kind that was added, tests, documents and comments left out: whoever adds the next one edits as many. An attribute
-is measured by adding one: tools/new_attribute.py; where that is not there, by the files that name one. A second process
+is measured by adding one: tools/lab/new_attribute.py; where that is not there, by the files that name one. A second process
 that trains along edits the users of the gradients' buffers and none of what makes them, so the room that holds those
 (engine/raster) does not count. The files that a format has of its own, reader, writer and layout, count as one.
 A number with a target is marked where it misses it.
@@ -89,8 +89,8 @@ def changes(root, files):
     own = [name for name in found["format"] if pathlib.Path(name).name.startswith("spz")]
     found["format"] = own[:1] + [name for name in found["format"] if name not in own]
     found["second process"] = [name for name in found["second process"] if not name.startswith("engine/raster/")]
-    if (root / "tools/new_attribute.py").is_file():
-        done = subprocess.run([sys.executable, root / "tools/new_attribute.py", "--check"], capture_output=True, text=True,
+    if (root / "tools/lab/new_attribute.py").is_file():
+        done = subprocess.run([sys.executable, root / "tools/lab/new_attribute.py", "--check"], capture_output=True, text=True,
                               check=False)
         if ": " not in done.stdout:
             sys.exit(f"structure.py: {done.stderr.strip()}")

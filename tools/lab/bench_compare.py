@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares two results of `darb bench --json`: which cases became faster or slower, and which differences are noise.
 
-    tools/bench_compare.py BEFORE.json AFTER.json [--passes] [--least PERCENT] [--json FILE]
+    tools/lab/bench_compare.py BEFORE.json AFTER.json [--passes] [--least PERCENT] [--json FILE]
 
 A difference counts as one when the middle halves of the samples (the quartiles) do not overlap and the medians are
 more than PERCENT apart (default 2); a rank test over all samples (Mann-Whitney, two-sided) must agree at p < 0.01

@@ -2,8 +2,8 @@
 """What the next attribute of splats takes: adds one, `glow`, a float that is added to all three channels of the colour,
 to a copy of the sources. It is trained, kept by density control, saved, resumed and compared with the reference in double.
 
-    tools/new_attribute.py --check      whether the changes fit the sources, and that they are in no more than 8 files
-    tools/new_attribute.py              builds the copy (build-attribute), runs `darb check` with it, trains the shipped
+    tools/lab/new_attribute.py --check      whether the changes fit the sources, and that they are in no more than 8 files
+    tools/lab/new_attribute.py              builds the copy (build-attribute), runs `darb check` with it, trains the shipped
                                         scene, and wants the attribute's gradients right, its column in the PLY changed by
                                         training, and a resumed run bit-equal; minutes
 """
@@ -69,7 +69,7 @@ def main():
     if {"-h", "--help"} & set(sys.argv[1:]):
         print(__doc__.strip())
         return 0
-    texts = changed_texts("tools/new_attribute.py", CHANGES)
+    texts = changed_texts("tools/lab/new_attribute.py", CHANGES)
     files = sorted(texts)
     print(f"a new attribute: {len(files)} files, at most {MOST_FILES}: {' '.join(files)}")
     if len(files) > MOST_FILES or "--check" in sys.argv[1:]:

@@ -20,7 +20,7 @@ VARIANTS = [OFTEN + RESET, OFTEN + ["--strategy", "mcmc"], OFTEN + ["--strategy"
 
 
 def scene_folder():
-    return os.path.join(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))), "assets", "scene")
+    return os.path.join(os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))), "assets", "scene")
 
 
 def whole(case, variant):

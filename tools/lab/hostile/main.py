@@ -2,7 +2,7 @@
 each finding and its files.
 
 Each case is a fresh folder, made from the seed, the part and the case's number alone: a finding repeats with
-    tools/hostile.sh --only PART --seed N --case NUMBER
+    tools/lab/hostile.sh --only PART --seed N --case NUMBER
 A command must end with its documented exit codes, within bounds of time and memory, name the file in its error, send
 nothing to the terminal that acts there, and leave inputs and files of the user as they are.
 """
@@ -23,7 +23,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import guard  # noqa: E402
 import samples  # noqa: E402
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
 PARTS = ["mutations", "faults", "kills", "flags", "folders", "pages"]
 KEEP = 3  # cases whose files are kept, of one finding
 
@@ -49,7 +49,7 @@ class Day:
             sys.exit(f"darb {' '.join(arguments)} ended with {done.returncode}: {done.stderr}")
 
     def repeat(self, case):
-        return f"tools/hostile.sh --only {case.part} --seed {self.seed} --case {case.number}"
+        return f"tools/lab/hostile.sh --only {case.part} --seed {self.seed} --case {case.number}"
 
     def record(self, case):
         for kind, text in dict.fromkeys(case.problems):
@@ -152,7 +152,7 @@ def spend(day, hours, parts):
 
 def main():
     parser = argparse.ArgumentParser(
-        prog="tools/hostile.sh", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog="tools/lab/hostile.sh", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="parts: " + ", ".join(PARTS) + ". Exit code 1: there are findings. The command under test is build/darb, or "
         "$DARB.")
     parser.add_argument("hours", nargs="?", type=float, help="how long; fractions are legal, 0.01 is a quick look")

@@ -2,7 +2,7 @@
 # The strategies adc, mcmc and budget side by side on data sets: the time that each takes to adc's final PSNR on
 # held-out views, and its final PSNR at adc's number of splats, which is the budget of the two others. STRATEGY_P is a run
 # of P percent of the iterations, whose rates and growth are made for it.
-#   tools/strategies.sh [-o OUT] [-n ITERATIONS] [-s "SEED..."] [-e EVALUATIONS] [-t "STRATEGY[_P]..."] SET...
+#   tools/lab/strategies.sh [-o OUT] [-n ITERATIONS] [-s "SEED..."] [-e EVALUATIONS] [-t "STRATEGY[_P]..."] SET...
 #                       [-- options of darb train...]
 # Default: -o strategies -n 30000 -s 0 -e 30 -t "adc_40 mcmc budget budget_60"; adc is always there. Runs lie in
 # OUT/SET/STRATEGY/seedN: finished ones are kept, one that was interrupted goes on. Times are those of training alone;
@@ -29,7 +29,7 @@ while [[ $# -gt 0 ]]; do
 done
 [[ ${#sets[@]} -gt 0 ]] || usage
 [[ $iterations -ge $evaluations && $evaluations -ge 1 ]] || fail "fewer iterations than evaluations"
-darb=${DARB:-$(cd "$(dirname "$0")/.." && pwd)/build/darb}
+darb=${DARB:-$(cd "$(dirname "$0")/../.." && pwd)/build/darb}
 [[ -x $darb ]] || fail "$darb is not built; name another with DARB="
 
 names=("${sets[@]%/}")

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
 # A hostile day as one command: mutated inputs, failing writes, kills, odd flags, odd folders and hostile names, against
 # build/darb (or $DARB) for HOURS hours, fractions allowed.
-#   tools/hostile.sh HOURS [--seed N] [--out DIR] [--only PART] [--case N]; --help says more
+#   tools/lab/hostile.sh HOURS [--seed N] [--out DIR] [--only PART] [--case N]; --help says more
 exec python3 -B "$(dirname "$0")/hostile/main.py" "$@"

@@ -2,9 +2,9 @@
 """Tables of what accuracy costs on some scenes (docs/experiments/accuracy_cost.md) and of what effects each data set calls
 for (docs/experiments/effect_costs.md).
 
-    tools/show_costs.py --darb build/darb --scene NAME=SCENE[,DATASET] ... [--quick]
+    tools/lab/show_costs.py --darb build/darb --scene NAME=SCENE[,DATASET] ... [--quick]
         runs `darb cost` on each scene; writes OUT/accuracy_cost.json
-    tools/show_costs.py --darb build/darb --plan NAME=PATH ... [--compare NAME=PATH[,CAMERAS] ...]
+    tools/lab/show_costs.py --darb build/darb --plan NAME=PATH ... [--compare NAME=PATH[,CAMERAS] ...]
         runs `darb plan` on each data set or scene, with time and memory of none, auto and all for those of
         --compare; writes OUT/effect_plans.json
 
@@ -23,9 +23,10 @@ import sys
 import tempfile
 
 import guards  # beside this file: the tables of a page
+import results
 
 SETTINGS_FIRST = ["balanced", "fast", "exact"]
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
 
 def read(path):
@@ -37,9 +38,7 @@ def read(path):
 
 def write(path, data):
     os.makedirs(os.path.dirname(os.path.abspath(path)), exist_ok=True)
-    with open(path, "w", encoding="utf-8") as file:
-        json.dump(data, file, indent=1, sort_keys=True)
-        file.write("\n")
+    results.write(path, dict(sorted(data.items())))
 
 
 def named(text):

@@ -24,7 +24,7 @@ import re
 import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 TABLE = ROOT / "assets/results/gpu_passes.json"
 LIB = "usr/lib/x86_64-linux-gnu"
 STABLE, NEW = "bookworm-backports", "unstable"
@@ -231,7 +231,7 @@ def check(root, darb, gpus, again):
     for line in found:
         print(line)
     if found:
-        print("Where it is meant, write the table anew: tools/gpu_compilers.py record DIR")
+        print("Where it is meant, write the table anew: tools/lab/gpu_compilers.py record DIR")
     return 1 if found else 0
 
 

@@ -2,7 +2,7 @@
 """Writes the tables of docs/speed.md from results of `darb bench`: every case with its most expensive passes and their shares of
 the roofline, and, where there is one of `darb bench --growth`, time against splats, pixels and intersections.
 
-    tools/speed_page.py          from assets/results/bench_lavapipe.json and growth_lavapipe.json
+    tools/lab/speed_page.py          from assets/results/bench_lavapipe.json and growth_lavapipe.json
 """
 
 import json
@@ -10,7 +10,7 @@ import os
 import re
 import sys
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 RESULTS = os.path.join(ROOT, "assets/results")
 PAGE = os.path.join(ROOT, "docs/speed.md")
 SHOWN = 4  # passes of a case

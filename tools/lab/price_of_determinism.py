@@ -3,8 +3,8 @@
 summed in order. Builds, in a copy of the sources (build-atomics), the other way: float atomics into one sum a splat;
 trains both in turn on the shipped scene, and prints the milliseconds of the two passes that differ.
 
-    tools/price_of_determinism.py [OUT.json] [ROUNDS]      default 5 rounds of 300 iterations, median of the rounds
-    tools/price_of_determinism.py --check                  only whether the changes still fit the sources
+    tools/lab/price_of_determinism.py [OUT.json] [ROUNDS]      default 5 rounds of 300 iterations, median of the rounds
+    tools/lab/price_of_determinism.py --check                  only whether the changes still fit the sources
 """
 
 import json
@@ -52,7 +52,7 @@ def main():
     if {"-h", "--help"} & set(sys.argv[1:]):
         print(__doc__.strip())
         return 0
-    texts = changed_texts("tools/price_of_determinism.py", CHANGES)
+    texts = changed_texts("tools/lab/price_of_determinism.py", CHANGES)
     if "--check" in sys.argv[1:]:
         print(f"atomics: {len(texts)} files, the changes fit")
         return 0

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """Figures of how far the numbers can be trusted: collected from what the checks print, shown in docs/experiments/float32.md.
 
-    tools/truth_figures.py WHAT=FILE...     takes new figures into assets/results/truth_lavapipe.json and leaves the
-                                            others as they are; `tools/guards.py docs` then shows them
+    tools/lab/truth_figures.py WHAT=FILE...     takes new figures into assets/results/truth_lavapipe.json and leaves the
+                                            others as they are; `tools/lab/guards.py docs` then shows them
         check=FILE    what `darb check --every-kernel --json FILE` wrote
         quick=FILE    the same of `darb check --json FILE`
-        price=FILE    what tools/price_of_determinism.py wrote
-        guards=FILE, soak=FILE    output of tools/guards.py run, tools/soak.sh
-        hostile=FILE  the hostile.json of tools/hostile.sh
+        price=FILE    what tools/lab/price_of_determinism.py wrote
+        guards=FILE, soak=FILE    output of tools/lab/guards.py run, tools/lab/soak.sh
+        hostile=FILE  the hostile.json of tools/lab/hostile.sh
         fuzz=FILE     output of tools/fuzz.sh, of one run or of several behind each other
 """
 
@@ -16,7 +16,9 @@ import os
 import re
 import sys
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+import results  # beside this file
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 FIGURES = "assets/results/truth_lavapipe.json"
 
 
@@ -137,18 +139,18 @@ def run_table(figures):
     line("`darb check`", "quick", lambda f: f"{f['checks']} checks in {f['seconds']:.0f} s, {f['failed']} failed")
     line("`darb check --every-kernel`", "check",
          lambda f: f"{f['checks']} checks in {f['seconds']:.0f} s, {f['failed']} failed")
-    line("`tools/guards.py run`", "guards",
+    line("`tools/lab/guards.py run`", "guards",
          lambda f: f"{f['disabled']} guards disabled in turn, {f['unwatched']} without a red test")
     line("`tools/fuzz.sh`", "fuzz",
          lambda f: f"{f['executions']:,} executions in {f['hours']} h, {f['findings']} findings left: " +
          ", ".join(f"{n} {r['executions']:,}" for n, r in f["of"].items()))
-    line("`tools/hostile.sh`", "hostile",
+    line("`tools/lab/hostile.sh`", "hostile",
          lambda f: f"{sum(f['of'].values()):,} executions in {f['hours']} h, {f['findings']} findings left: " +
          ", ".join(f"{n} {count:,}" for n, count in f["of"].items()))
-    line("`tools/soak.sh`", "soak",
+    line("`tools/lab/soak.sh`", "soak",
          lambda f: f"{f['iterations']:,} iterations: {f['mib_in_the_fourth_fifth']} MiB, "
          f"then {f['mib_in_the_last_fifth']} MiB")
-    line("`tools/price_of_determinism.py`", "price",
+    line("`tools/lab/price_of_determinism.py`", "price",
          lambda f: f"{f['deterministic']['ms']['all passes']} ms an iteration, with atomics "
          f"{f['atomics']['ms']['all passes']} ms; {f['rounds']} runs end in {f['deterministic']['different_scenes']} "
          f"and {f['atomics']['different_scenes']} different scenes")
@@ -178,9 +180,8 @@ def main():
             sys.exit(__doc__)
         with open(path, encoding="utf-8") as file:
             figures[what] = COLLECT[what](file.read())
-    with open(os.path.join(ROOT, FIGURES), "w", encoding="utf-8") as file:
-        file.write(json.dumps(figures, indent=1) + "\n")
-    print("tools/guards.py docs writes them into docs/experiments/float32.md")
+    results.write(os.path.join(ROOT, FIGURES), figures)
+    print("tools/lab/guards.py docs writes them into docs/experiments/float32.md")
     return 0
 
 

@@ -2,16 +2,17 @@
 """Keeps what `darb compare` found on data sets in assets/results/scenes_lavapipe.json and writes its tables into
 docs/experiments/kernels_on_photos.md.
 
-    tools/scene_tables.py TITLE=COMPARE.json...     takes these comparisons, one table each; others stay
-    tools/scene_tables.py                           only writes the page again
+    tools/lab/scene_tables.py TITLE=COMPARE.json...     takes these comparisons, one table each; others stay
+    tools/lab/scene_tables.py                           only writes the page again
 """
 
 import json
 import os
-import re
 import sys
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+import results  # beside this file
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 FIGURES = os.path.join(ROOT, "assets/results/scenes_lavapipe.json")
 PAGE = os.path.join(ROOT, "docs/experiments/kernels_on_photos.md")
 KEPT = {"psnr_db": 3, "ssim": 4, "lpips": 4, "model_mb": 3, "splats": 0, "peak_mb": 1, "training_s": 1}
@@ -110,9 +111,7 @@ def main():
         page = file.read()
     page = replaced(page, "the tables of blending", [blending_table(*item) for item in figures.items()])
     page = replaced(page, "the tables of the data sets", [table(*item) for item in figures.items()])
-    text = json.dumps(figures, indent=1)
-    with open(FIGURES, "w", encoding="utf-8") as file:  # a row a line
-        file.write(re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n")
+    results.write(FIGURES, figures)
     with open(PAGE, "w", encoding="utf-8") as file:
         file.write(page)
 

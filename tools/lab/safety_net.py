@@ -24,7 +24,7 @@ import sys
 import tempfile
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "assets" / "scene"
 TRAIN = ["--eval", "--no-report", "-q"]
 USUAL = {"-r": "100", "--tune": "backward=subgroup"}  # of a run that does not say otherwise

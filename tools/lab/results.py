@@ -1,0 +1,24 @@
+"""How the laboratory writes its results: JSON with a row a line, so that a file is short and a change of it is read."""
+
+import json
+
+LONGEST = 240  # characters of what stands on one line
+
+
+def text(value, indent=0):
+    """The value as JSON: on one line where that is short, else a line for each of its members."""
+    line = json.dumps(value)
+    if len(line) <= LONGEST or not isinstance(value, (dict, list)):
+        return line
+    pad = "\n" + " " * (indent + 1)
+    if isinstance(value, dict):
+        members = [f"{json.dumps(key)}: {text(member, indent + 1)}" for key, member in value.items()]
+    else:
+        members = [text(member, indent + 1) for member in value]
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
+    return opening + pad + ("," + pad).join(members) + "\n" + " " * indent + closing
+
+
+def write(path, value):
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text(value) + "\n")
