@@ -108,6 +108,46 @@ def same_names(files):
     return sorted(" ".join(names) for names in folders.values() if len(names) > 1)
 
 
+def matches(root, names, pattern, flags=0):
+    return sum(len(re.findall(pattern, pathlib.Path(root, name).read_text(errors="replace"), flags)) for name in names)
+
+
+def upward_arrows(root):
+    """The rooms of trainer/, and the includes among them that go against the order in ARCHITECTURE.md."""
+    page = pathlib.Path(root, "ARCHITECTURE.md").read_text()
+    rooms = re.findall(r"^trainer/(\w+) *->", page, re.MULTILINE)
+    climbs = 0
+    for path in pathlib.Path(root, "trainer").glob("*/*"):
+        for room in re.findall(r'^#include "trainer/(\w+)/', path.read_text(), re.MULTILINE):
+            climbs += rooms.index(room) > rooms.index(path.parent.name)
+    return len(rooms), climbs
+
+
+def targets(root, files):
+    """What the shape of the tree should come to: (what, how it is now, most that it should be)."""
+    lines = {name: len(pathlib.Path(root, name).read_text(errors="replace").splitlines()) for name in files}
+    code = [name for name in files if name.endswith((".cpp", ".h", ".comp", ".glsl"))]
+    command = [name for name in code if name.startswith("tools/darb/")]
+    listed = subprocess.run(["git", "-C", root, "ls-files", "*.json"], capture_output=True, text=True, check=True)
+    floors, climbs = upward_arrows(root)
+    users = sum('"tools/darb/train_flags.h"' in pathlib.Path(root, name).read_text(errors="replace") for name in code)
+    return [
+        ("files that include train_flags.h", users, 4),
+        ("headers of tools/darb in tools/python", matches(root, [n for n in code if n.startswith("tools/python/")],
+                                                          r'^#include "tools/darb/', re.MULTILINE), 0),
+        ("files of tools/darb", len(command), 60),
+        ("lines of tools/darb", sum(lines[name] for name in command), 6000),
+        ("rooms of trainer/", floors, 6),
+        ("includes up the rooms of trainer/", climbs, 0),
+        ("constructions of Schedule", matches(root, [n for n in code if n.endswith(".cpp")],
+                                              r"\bSchedule(?: \w+)?[({](?!const\b)(?=\w)"), 3),
+        ("files for each 1,000 lines", round(1000 * len(code) / sum(lines[name] for name in code), 1), 6),
+        ("lines of JSON", sum(len(pathlib.Path(root, name).read_text().splitlines())
+                              for name in listed.stdout.split()), 8000),
+        ("comments that begin with \"of\"", matches(root, code, r"//+ *[Oo]f "), 50),
+    ]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="the same, with every place, as JSON")
@@ -119,8 +159,9 @@ def main():
     lists = {"functions over 60 lines": over(functions, LONGEST_FUNCTION),
              "signatures over 7 parameters": over(signatures, MOST_PARAMETERS),
              "classes over 25 members": over(members, MOST_MEMBERS)}
+    shape = targets(options.root, files)
     if options.json:
-        print(json.dumps({**lists, "files of one name": same_names(files), "files of a change": touched}, indent=1))
+        print(json.dumps({**lists, "targets": shape, "files of one name": same_names(files), "files of a change": touched}, indent=1))
         return
     for title, rows in lists.items():
         print(f"{title}: {len(rows)}")
@@ -131,6 +172,9 @@ def main():
         print(f"        {names}")
     for name in ("Trainer", "Forward", "Viewer"):
         print(f"class {name}: {members.get(name, 0)} members, {methods.get(name, 0)} methods")
+    print("the shape of the tree:")
+    for what, now, most in shape:
+        print(f"  {what:40} {now:6}  (target {most}){'' if now <= most else '  over'}")
     print("files that name the last thing of a kind:")
     for kind, (example, _, most) in CHANGES.items():
         count = len(touched[kind])
