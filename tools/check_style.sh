@@ -2,7 +2,7 @@
 # Include arrows and layout of every source file, and the links of every page; prints each violation.
 #   tools/check_style.sh [--fix | --tidy] [ROOT]
 #     --fix    let clang-format rewrite the files
-#     --tidy   clang-tidy instead, on every file of build-clang or build (minutes); .clang-tidy has its checks
+#     --tidy   clang-tidy instead, on every source file (it takes minutes); .clang-tidy has its checks
 set -uo pipefail
 case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
@@ -15,6 +15,7 @@ cd "${1:-$here/..}" || exit 2
 failed=0
 
 if [[ $tidy == 1 ]]; then
+    command -v clang-tidy-14 >/dev/null || { echo "check_style.sh: --tidy runs clang-tidy-14; install that package" >&2; exit 2; }
     cmake -S . -B build-tidy -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
         -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DDARB_TESTS=OFF >/dev/null || exit 1
     cmake --build build-tidy --target darb_shaders >/dev/null || exit 1 # headers that are made
