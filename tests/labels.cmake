@@ -2,13 +2,16 @@
 # step that runs the test (unit, sync, gpu, long or python; sync is under Vulkan's validation, gpu is not); and
 # `sanitized` for what runs under ASan and UBSan, too. The last part of a name says how long it takes: _slow or _long.
 
+cmake_policy(PUSH)
+cmake_policy(VERSION 3.22)  # ctest, which includes this, sets none
+
 # Without validation: tests of processes and scripts, those that look at SPIR-V or at other vector widths, and tests of
 # passes that other tests record with other numbers.
 set(darb_without_validation "_slow$|PassSpirv|^scripts\\.|^pages\\.|\\.Outputs$")
 set(darb_same_passes kernel_gradient_test walk_test accuracy_walk_test hard_case_test blend_test blend_backward_test
   project_test effect_picture_test viewer_picture_test)
 # Not under sanitizers: numerics of the device, which have no more host code than others, and what reads no files.
-set(darb_not_sanitized "_slow$|PassSpirv|^scripts\\.|^pages\\.|\\.(Outputs|StrategyTable|ClusterRows|Undistort|Psi)$")
+set(darb_not_sanitized "_slow$|PassSpirv|\\.Reference/|^scripts\\.|^pages\\.|\\.(Outputs|StrategyTable|ClusterRows|Undistort|Psi)$")
 # The same as cases of GoogleTest, where each is a process.
 set(darb_not_sanitized_cases *_slow *_slow/* *_long *_long/* *PassSpirv* Outputs.* every*/* settings/* Reference/*
   *WalkCases* *TuningWalk* Psi.* *HardCases* *EffectPicture* *EffectTraining* *for_every_kernel *Accuracy_switch_changes*)
@@ -29,3 +32,5 @@ function(darb_labels out test kind)
   endif()
   set(${out} "${labels}" PARENT_SCOPE)
 endfunction()
+
+cmake_policy(POP)
