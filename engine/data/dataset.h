@@ -30,17 +30,16 @@ struct View {
     std::filesystem::path photo;  // path of the file
     std::filesystem::path mask;  // empty where there is none; 8-bit, 0 = ignore; made for the photo
                                  // as stored or as its EXIF turns it, at any size
-    std::filesystem::path
-        depth;              // measured depth; empty where there is none; see engine/data/depths.h
+    std::filesystem::path depth;  // measured; empty where there is none; see engine/data/depths.h
     double depth_unit = 0;  // metres per step of the depth file; 0: as the type of the file says
     bool depth_unit_of_integers = false;  // depth_unit applies to integers only, not to floats
-    double crop_radius =
-        0;  // of the lens image, px: pixels farther from the middle are left out; 0: none are
-    Camera camera;                // for the photo as load_photo returns it
-    LensModel lens;               // for the file on disk, turned by orientation; see load_photo
-    bool is_test = false;         // held out
-    bool in_arc = false;          // in the arc of HoldOut; is_test is set as well
-    int orientation = 1;          // EXIF orientation that load_photo applies; 1 = as stored
+    double crop_radius = 0;  // px: what lies farther from the middle of the lens's image is left
+                             // out; 0: nothing is
+    Camera camera;           // for the photo as load_photo returns it
+    LensModel lens;          // for the file on disk, turned by orientation; see load_photo
+    bool is_test = false;    // held out
+    bool in_arc = false;     // in the arc of HoldOut; is_test is set as well
+    int orientation = 1;     // EXIF orientation that load_photo applies; 1 = as stored
     std::uint32_t source_id = 0;  // COLMAP's image id
 };
 
@@ -93,7 +92,7 @@ struct Dataset {
     PointCloud points;        // may be empty
     PointCloud start;         // training starts from these instead of points, unless empty
     bool has_alpha = false;   // some photo has an alpha channel, a mask, or gaps from undistortion
-    double depth_scale = 1;   // of the measured depths: world units a metre
+    double depth_scale = 1;   // world units a metre, for the measured depths
     PhotoDetail
         detail;  // detail of the photos; per_pixel and opaque are 0 where it was not measured
     bool alpha_is_mask = false;      // some alpha comes from masks or gaps: pixels to leave out

@@ -41,9 +41,8 @@ struct TransformsFile {
     // integer_depth_scale (instant-ngp), which applies to integers only; 0: not declared.
     double depth_unit = 0;
     bool unit_of_integers = false;
-    bool read_depths = true;  // nerfstudio's enable_depth_loading
-    double applied_scale =
-        1;  // world units of the file a metre: the scale that its writer applied to the poses
+    bool read_depths = true;   // nerfstudio's enable_depth_loading
+    double applied_scale = 1;  // world units a metre: how the writer of the file scaled the poses
     // nerfstudio's split, which may be empty; val_filenames where test_filenames is empty.
     std::vector<std::string> train_filenames, test_filenames;
     std::size_t scaled_poses = 0;    // poses whose rotation contained a scale
