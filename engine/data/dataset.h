@@ -71,15 +71,13 @@ struct DatasetOptions {
     HoldOut held_out{};     // --hold-out
     std::optional<double> depth_scale{};  // world units a metre; absent: find_depth_scale
     bool require_photos = true;           // false: cameras only (render)
-    bool original_lens =
-        false;  // keep distorted photos as they are, and give their cameras the lens
-    bool original_where_wide = false;  // do so only for lenses that are too_wide_to_undistort
+    bool original_lens = false;           // leave photos distorted, and give cameras the lens
+    bool original_where_wide = false;     // do so only for lenses that are too_wide_to_undistort
 };
 
 /// The result of photo_detail().
 struct PhotoDetail {
-    double per_pixel =
-        0;  // mean of |4 g - sum of its four neighbours|, where g is the grey value, 0 to 1
+    double per_pixel = 0;  // mean |4 g - sum of g of four neighbours|, g: grey, 0 to 1
     double opaque = 0;  // share of the pixels that are opaque and have four opaque neighbours; 0:
                         // nothing is known
 };

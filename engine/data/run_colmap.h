@@ -58,18 +58,16 @@ double colmap_seconds_left(ColmapStep step, double seconds, std::size_t done, st
 enum class ColmapEffort { quick, usual, thorough };
 
 struct ColmapRun {
-    std::filesystem::path photos;     // a folder of PNG and JPEG files
-    std::filesystem::path workspace;  // made where missing; holds the data set afterwards
-    std::filesystem::path masks =
-        {};                     // a folder of masks: black parts get no features; may be empty
-    bool sequential = false;    // match only neighbours in name order: for video frames
-    bool single_camera = true;  // all photos were taken by one camera at one zoom
-    int max_image_size = 1600;  // the larger side of undistorted photos, px
-    std::size_t count = 0;      // number of photos; 0: not known
+    std::filesystem::path photos;      // a folder of PNG and JPEG files
+    std::filesystem::path workspace;   // made where missing; holds the data set afterwards
+    std::filesystem::path masks = {};  // a folder: no features where black; may be empty
+    bool sequential = false;           // match only neighbours in name order: for video frames
+    bool single_camera = true;         // all photos were taken by one camera at one zoom
+    int max_image_size = 1600;         // the larger side of undistorted photos, px
+    std::size_t count = 0;             // number of photos; 0: not known
     ColmapEffort effort = ColmapEffort::usual;  // the effort to begin with
     bool quick_sequential = false;              // match sequentially, but at the quick effort only
-    const std::atomic<bool>* stop =
-        nullptr;  // when it is set, COLMAP is ended and ColmapStopped thrown
+    const std::atomic<bool>* stop = nullptr;    // when set: ends COLMAP, throws ColmapStopped
 };
 
 /// What a run reports while it works; any function may be empty.

@@ -17,8 +17,7 @@ struct TrackAdjustment {
     bool adjusted = false;  // false: nothing was changed
     std::size_t views = 0, points = 0, observations = 0;
     double before_px = 0,
-           after_px =
-               0;  // median distance between where points are projected and where they were seen
+           after_px = 0;        // median distance of projected points from tracks
     double median_move_px = 0;  // median move of the cameras that moved, px; see PoseMetric
 };
 

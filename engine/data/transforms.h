@@ -21,8 +21,7 @@ struct TransformsIntrinsics {
     double p1 = 0, p2 = 0;
     std::string camera_model;        // nerfstudio's name; empty where not stated
     std::optional<bool> is_fisheye;  // instant-ngp
-    double crop_radius =
-        0;  // nerfstudio: pixels farther from the middle are left out, px; 0: none are
+    double crop_radius = 0;          // nerfstudio: px around the middle that count; 0: all
 };
 
 struct TransformsFrame {
