@@ -292,7 +292,7 @@ bool all_finite(const DeviceWalk& walk) {
     return all_finite(walk.image.data);
 }
 
-// Of several rows the one nearest to its tolerance, or the first that failed.
+// The row nearest to its tolerance, or the first that failed.
 Row worst_of(const std::vector<Row>& rows, const std::string& name) {
     Row worst = rows.front();
     const auto ratio = [](const Row& r) { return r.allowed > 0 ? r.error / r.allowed : 0; };

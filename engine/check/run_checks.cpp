@@ -116,7 +116,7 @@ namespace {
 
 constexpr double kCutoff = 1 / 255.0;
 constexpr double kSlopeRounding = 2e-6;
-// Of shaders/kernels/sine.glsl, which rings take, and of the root of q before it.
+// Rounding of shaders/kernels/sine.glsl, which rings use, and of the root of q before it.
 constexpr double kRingRounding = 2e-6, kRingSlopeRounding = 1e-5;
 
 // q over the support and just around its edge.
@@ -175,7 +175,8 @@ bool near_edge(int kernel, double q, bool jumps) {
     return false;
 }
 
-// Of a kernel with shapes, at one exponent; centre, edge and both sides of it are among the probes.
+// Checks a kernel with shapes at one exponent; the probes include the centre, the edge and both
+// sides of it.
 Row shaped_row(Device& device, int kernel, Footprint footprint, double exponent, Row& slope_row) {
     const std::vector<KernelProbe> probes = ramp(kernel);
     const auto answers = probe_kernel(device, kernel_constants(kernel, footprint), probes,

@@ -70,8 +70,8 @@ class LogFile {
     fs::path path_;
 };
 
-// An ffmpeg expression that is not 0 for these pictures. In groups, because ffmpeg accepts no sum
-// of more than about a hundred terms.
+// An ffmpeg expression that is not 0 for these pictures. It consists of groups, because ffmpeg
+// accepts no sum with more than about a hundred terms.
 std::string selection(const std::vector<std::size_t>& pictures) {
     constexpr std::size_t kGroup = 50;
     std::string text;

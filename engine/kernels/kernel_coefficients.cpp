@@ -1,8 +1,8 @@
 #include "engine/kernels/kernel_coefficients.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -105,7 +105,7 @@ void measure(const DerivedKernel& kernel, Footprint footprint, KernelCoefficient
     constexpr int kSamples = 1000;
     const bool gaussian = !std::isfinite(k.support);
     const double end = gaussian ? 16 : k.support;
-    KernelCoefficients drawn = k;  // of an exponential what 2^f alone strays
+    KernelCoefficients drawn = k;  // for an exponential, so that only the error of 2^f is measured
     if (gaussian) drawn.form = KERNEL_FORM_GAUSSIAN;
     for (int i = 0; i < kSamples; ++i) {
         const double q = end * i / kSamples;

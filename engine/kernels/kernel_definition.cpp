@@ -16,11 +16,11 @@ namespace darb {
 namespace {
 
 constexpr int kSeriesNodes = static_cast<int>(kMostSeriesTerms), kGrid = 2048;
-constexpr double kRounding = 1e-9;  // of an expression in double that cancels
+constexpr double kRounding = 1e-9;  // rounding of an expression in double with cancellation
 constexpr double kSameProfile = 1e-12;
 constexpr double kZeroAtEdge = 1e-6;  // a value of w / u^k at the edge below this is none
-// Of the shaders' polynomial in double and of its evaluation in float32: what darb check tells from
-// a device that computes wrongly.
+// The largest error of the shaders' polynomial at which darb check can tell it from a device that
+// computes wrongly: that of its fit in double plus that of its evaluation in float32.
 constexpr double kFaithful = 4.8e-7;
 
 std::string in_words(double number) {

@@ -48,7 +48,7 @@ std::vector<Part> items_of(std::string_view list) {
     return items;
 }
 
-/// Of "support 9" or "name cubic": what is behind the word.
+/// What follows the word in "support 9" or "name cubic".
 std::optional<Part> behind(std::string_view word, const Part& item) {
     if (!item.text.starts_with(word)) return std::nullopt;
     const std::size_t next = item.text.find_first_not_of(kBlanks, word.size());

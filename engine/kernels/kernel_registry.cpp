@@ -14,7 +14,7 @@
 namespace darb {
 namespace {
 
-constexpr int kMostKernels = 1000;  // of a process; a hostile folder of files could go on
+constexpr int kMostKernels = 1000;  // per process; a hostile folder of files could go on for ever
 // The fit of a footprint that shaders may draw: more would be seen beside the reference.
 constexpr double kDrawable = 1e-6;
 

@@ -1,9 +1,9 @@
 #include "engine/kernels/shaped_kernel.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fmt/format.h>
 #include <iterator>
 #include <memory>
 #include <mutex>
@@ -163,7 +163,7 @@ class BetaKernel : public ShapedKernel {
     }
 
     double rounding(double exponent) const override {
-        return 2e-7 + 2e-7 * exponent;  // of the logarithm
+        return 2e-7 + 2e-7 * exponent;  // rounding of the logarithm
     }
 
     std::vector<double> exponents_to_check() const override {
@@ -189,7 +189,7 @@ double beta_shape_of(double b) {
 namespace {
 
 constexpr double kMostShape = 30;  // 1 - m is above rounding
-constexpr double kLastShape = 6;   // of the tables: m within 0.25 % of 0 and 1
+constexpr double kLastShape = 6;   // last row of the tables: m within 0.25 % of 0 and 1
 
 class BlendKernel : public ShapedKernel {
   public:

@@ -20,7 +20,7 @@ constexpr std::uint32_t kRowBytes = RADIX_MAX_DIGITS * 4;  // counters of a subg
 // 1024 keys a thread make the 256 counters of its column cheap; 8 lanes are then 8192 keys a block.
 constexpr std::uint32_t kColumnItems = 1024;
 constexpr std::uint32_t kBallotThreads = 256, kBallotItems = 16;
-constexpr std::uint32_t kSumBytes = 64 * 4;  // of subgroups, at most
+constexpr std::uint32_t kSumBytes = 64 * 4;  // sums of the subgroups, at most
 constexpr std::uint32_t kOffsetThreads = 256;
 
 SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_t subgroups,
@@ -50,7 +50,8 @@ RadixSort::Shape RadixSort::choose_shape(const Device& device, SortScatter scatt
     // them.
     const std::uint32_t fewest = device.info().min_subgroup_size;
     const std::uint32_t items = fewest <= 16 && fewest < lanes ? kBallotItems / 2 : kBallotItems;
-    // Of a thread: its share of a subgroup's row, and its keys. Besides a row of the block.
+    // Shared memory that a thread takes: its share of a subgroup's row, and its keys. The block's
+    // row comes on top.
     const std::uint32_t bytes = kRowBytes / lanes + items * 4;
     const std::uint32_t room = device.info().shared_memory_bytes - kRowBytes - kSumBytes;
     const std::uint32_t threads = std::clamp(std::bit_floor(room / bytes), lanes, kBallotThreads);

@@ -14,7 +14,7 @@ constexpr std::uint32_t kThreads = 64;
 // Rows of a thread on lavapipe, where loads of centres cost: as many as Mesa 22.3 unrolls with some
 // room. With 5 it is a tenth faster, with 6 three times slower.
 constexpr std::uint32_t kLavapipeRows = 4;
-constexpr std::uint64_t kPartBytes = 32 << 20;  // of rows on the device at once
+constexpr std::uint64_t kPartBytes = 32 << 20;  // rows on the device at a time
 
 /// [count][quads * 4]: padded with zeros.
 std::vector<float> padded(const float* from, std::size_t count, std::size_t dims,

@@ -1,7 +1,7 @@
 #include "engine/publish/page_document.h"
 
-#include <cmath>
 #include <fmt/format.h>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
@@ -29,7 +29,7 @@ std::string page_shader(std::string_view name, const SpecConstants& constants);
 
 namespace {
 
-constexpr std::size_t kPayloadPart = 3 << 16;  // of the payload in one element
+constexpr std::size_t kPayloadPart = 3 << 16;  // bytes of the payload in one element
 const std::string kFolder = "engine/publish/page/";
 
 using Json = nlohmann::json;

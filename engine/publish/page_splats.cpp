@@ -97,7 +97,7 @@ void add_rounded(int attribute, int component, double step, const Values& value,
                  integers, to);
 }
 
-/// Of the second largest standard deviations, the one that a tenth of the splats have less than.
+/// The 10 % quantile of the splats' second largest standard deviations, world units.
 double typical_size(const SplatModel& model) {
     std::vector<float> middle;
     for (std::size_t i = 0; i < model.size(); ++i) {
@@ -186,8 +186,9 @@ void join_rotations(SplatModel& model) {
 PagePrecision page_precision(int level, int kernel) {
     if (level >= kPageLevels) return {.exact = true};
     const double share = std::ldexp(1.0, -level);
-    // Where w ends with a jump, pixels between the true outline and the rounded one are off by all
-    // of it. With these steps the inverse quadratic comes as near at level 0 as other kernels.
+    // Where w ends with a jump, pixels between the true outline and the rounded one are off by the
+    // whole jump. With these steps, the inverse quadratic is as accurate at level 0 as other
+    // kernels.
     const bool jumps = ends_with_a_jump(kernel);
     return {.position = share / 8,
             .log_scale = share / (jumps ? 200 : 20),

@@ -32,7 +32,7 @@ using std::chrono::duration;
 using std::chrono::milliseconds;
 
 constexpr int kSizeTag = 1, kBytesTag = 2, kAliveTag = 3;
-constexpr std::size_t kMostBytes = 1u << 30;  // of one message: MPI counts in int
+constexpr std::size_t kMostBytes = 1u << 30;  // per message, because MPI counts in int
 constexpr auto kBeat = milliseconds(500);
 constexpr double kSilentSeconds = 12;  // DARB_RANK_TIMEOUT has another
 // The first rank watches all and the others the first: where that is silent, rank 1 is to say so.

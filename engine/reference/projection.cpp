@@ -1,8 +1,8 @@
 #include "engine/reference/projection.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 
 #include "engine/core/error.h"
 #include "engine/kernels/shaped_kernel.h"
@@ -28,7 +28,7 @@ T antialias_factor(const Splats<T>& splats, const CovarianceTerms<T>& terms) {
     return splats.antialias ? std::sqrt(terms.det_sharp / terms.det) : T(1);
 }
 
-/// Of a kernel with shapes; else 0, which no kernel reads.
+/// The exponent of a splat whose kernel has shapes; else 0, which no kernel reads.
 template <class T>
 T exponent_of(const Splats<T>& splats, size_t index) {
     if (!kernel_has_shape(splats.kernel)) return 0;
@@ -236,8 +236,8 @@ CameraGradients<T> camera_backward(const CameraInputs<T>& in, const CovarianceTe
                  in.d_px.y * value.y + glm::dot(in.d_j2, terms.j2) / T(camera.fy)};
     d.d_principal = in.d_px;
     if (camera.lens.active) return d;
-    // A ratio that is held is a corner of the picture, (pixel - c) / f: its row's f ratio is free
-    // of f, and goes with -c.
+    // A clamped ratio is that of a corner of the picture, (pixel - c) / f, so f times the ratio in
+    // its row does not depend on f, and changes by -c.
     if (!terms.ratio.x_inside) {
         d.d_focal.x += in.d_j1.z * terms.ratio.x / in.mean.z;
         d.d_principal.x += in.d_j1.z / in.mean.z;
@@ -283,7 +283,7 @@ template <class T>
 void set_shape(const Camera& camera, const RenderSettings& settings,
                const RotationTerms<T>& rotation, const CovarianceTerms<T>& terms,
                ProjectedSplat<T>& p) {
-    const T area = terms.shrink * terms.shrink;  // of a shrunk px^2
+    const T area = terms.shrink * terms.shrink;  // scale of det after shrinking, per px^2
     p.cov_xx = glm::dot(terms.r1, terms.r1) + T(settings.low_pass);
     p.cov_xy = glm::dot(terms.r1, terms.r2);
     p.cov_yy = glm::dot(terms.r2, terms.r2) + T(settings.low_pass);
@@ -329,7 +329,7 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
         p.cull = Cull::opacity;
         return p;
     }
-    const T area = terms.shrink * terms.shrink;  // of a shrunk px^2
+    const T area = terms.shrink * terms.shrink;  // scale of det after shrinking, per px^2
     if (!(terms.det > T(DETERMINANT_MIN) * area * area)) {
         p.cull = Cull::covariance;
         return p;

@@ -1,9 +1,9 @@
 #include "engine/render/render_gradients.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <fmt/format.h>
 #include <functional>
 #include <optional>
 #include <span>
@@ -144,7 +144,7 @@ std::vector<float> gradient_planes(const ImageF& d_image, const ImageF& d_alpha,
 
 struct GradientRenderer::State {
     Device& device;
-    SplatModel header;  // of no splats
+    SplatModel header;  // all but the splats
     GradientOptions options;
     GpuSplats splats;
     FrameExchange exchange;
@@ -155,7 +155,7 @@ struct GradientRenderer::State {
     std::optional<Forward> forward;
     std::optional<Backward> backward;
     Buffer d_image, camera_shares;
-    Camera camera;  // of the last picture
+    Camera camera;  // camera of the last picture
     FrameView view{};
     ImageF image;  // the last picture; no pixels before it
     ImageF alpha, transmittance;
@@ -250,7 +250,7 @@ struct RowsTo {
 struct Source {
     int attribute;
     std::span<const float> values;
-    std::size_t floats = 0;  // of a splat
+    std::size_t floats = 0;  // per splat
     std::vector<RowsTo> targets{};
 
     void add(const GpuSplats& splats, int target) {
@@ -291,7 +291,7 @@ void with_buffers(GpuSplats& splats, std::span<RowsTo* const> targets,
         });
 }
 
-constexpr std::size_t kSplatsOfPiece = 256 * ROW_BLOCK;  // of a thread
+constexpr std::size_t kSplatsOfPiece = 256 * ROW_BLOCK;  // splats that one thread takes at a time
 
 }  // namespace
 

@@ -1,8 +1,8 @@
 #include "engine/report/svg_plot.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -11,7 +11,7 @@
 
 namespace darb {
 
-// Of every plot's view box, in user units; CSS scales the whole.
+// The view box of every plot, in user units; CSS scales the whole.
 constexpr double kPlotWidth = 480, kPlotHeight = 260;
 constexpr double kPlotLeft = 70, kPlotRight = 28, kPlotTop = 30, kPlotBottom = 44;
 
@@ -46,7 +46,7 @@ struct Legend {
     double height = 0;  // that the plot begins lower by
 };
 Legend draw_legend(const std::vector<LegendEntry>& entries, double width = kPlotWidth);
-/// Of a text in the font of ticks and legends.
+/// The width of a text in the font of ticks and legends, user units.
 double text_width(const std::string& text);
 /// The text, or its beginning and an ellipsis where it is wider than that.
 std::string fit_text(const std::string& text, double width);
@@ -192,7 +192,7 @@ std::string svg_stack(const StackPlot& plot) {
 
 namespace {
 
-constexpr double kCharacterWidth = 6.3;  // of the ticks' font at 11 px, user units
+constexpr double kCharacterWidth = 6.3;  // in the ticks' font at 11 px, user units
 constexpr double kLineHeight = 13, kBetweenTicks = 6;
 constexpr double kMostDecades = 7;  // with a tick each
 
@@ -212,7 +212,7 @@ std::string tick_text(double v) {
 // Those of a row or column of texts that keep clear of the one before.
 std::vector<double> apart(const std::vector<double>& ticks, const Axis& axis, bool upright) {
     std::vector<double> kept;
-    double end = -1e9;  // of the last text, along the axis
+    double end = -1e9;  // end of the last text, along the axis
     for (const double v : ticks) {
         const double at = std::abs(axis.place(v) - axis.from);
         const double half = upright ? kLineHeight / 2 : text_width(tick_text(v)) / 2;

@@ -16,8 +16,8 @@ namespace {
 // and cost 0.3 dB of the palette. Seeds far from each other come 3 dB nearer to the rows, and yet
 // pictures lose 1 dB by them: the rows that stand apart are of splats that hardly show.
 constexpr std::size_t kLeafCentres = 1024, kLeastLeafRows = 2048, kMostLeafRows = 8192;
-constexpr int kRounds = 10;          // of k-means
-constexpr double kErrorPower = 0.8;  // centres of a leaf: its error to this power
+constexpr int kRounds = 10;          // rounds of k-means
+constexpr double kErrorPower = 0.8;  // a leaf gets centres in proportion to this power of its error
 constexpr std::size_t kLanes = 16;   // centres at a time
 constexpr int kCodebookRounds = 30;
 constexpr std::size_t kHistogram = 512;

@@ -1,9 +1,9 @@
 #include "engine/scene/gltf.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <optional>
@@ -29,7 +29,7 @@ using nlohmann::json;
 using GltfBytes = std::span<const std::byte>;
 namespace fs = std::filesystem;
 
-constexpr int kMostDepth = 64;  // of the JSON; glTF itself needs 10 or so
+constexpr int kMostDepth = 64;  // nesting of the JSON; glTF itself needs about 10
 
 json parse_text(GltfBytes text, const std::string& where) {
     const auto* begin = reinterpret_cast<const char*>(text.data());
@@ -282,7 +282,7 @@ using nlohmann::json;
 
 // glTF has y up and z backward; scenes in memory have y down and z forward, as SPZ's are turned.
 const glm::dmat4 kFromYUp(1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1);
-constexpr double kSameLength = 1e-4;  // of the axes of a node, relative
+constexpr double kSameLength = 1e-4;  // relative tolerance for the lengths of a node's axes
 
 unsigned bit(gltf::ComponentType type, bool normalized) {
     return 1u << (2 * static_cast<unsigned>(type - gltf::kInt8) + (normalized ? 1u : 0u));
@@ -320,7 +320,7 @@ struct GltfScene {
     }
 };
 
-/// Of an attribute of a primitive, or of our extension's; allowed: bits.
+/// The accessor of a primitive's attribute, or of one of darb's extension. allowed: bits.
 std::optional<Accessor> attribute(const GltfScene& scene, const json& attributes, const char* name,
                                   int components, unsigned allowed) {
     if (!attributes.contains(name)) return std::nullopt;

@@ -36,11 +36,11 @@ constexpr KsplatLevel kLevels[] = {{4, 4, 4, 4}, {2, 2, 2, 2}, {2, 2, 2, 1}};
 struct KsplatSection {
     std::uint64_t splats = 0, room = 0;  // splats that are there, and that there is room for
     std::uint64_t bucket_size = 0, buckets = 0, full_buckets = 0, part_buckets = 0;
-    std::uint64_t bucket_bytes = 0;  // of a centre
-    double step = 0;                 // of a position
+    std::uint64_t bucket_bytes = 0;  // bytes of a bucket's centre
+    double step = 0;                 // step of a position, world units
     double range = 0;                // subtracted from its 16 bits
     int degree = 0;
-    std::uint64_t begin = 0;  // of its data, in the file
+    std::uint64_t begin = 0;  // offset of the section's data in the file
 
     std::size_t harmonics() const {
         return 3 * static_cast<std::size_t>((degree + 1) * (degree + 1) - 1);
@@ -59,10 +59,10 @@ struct KsplatFile {
     KsplatBytes bytes;
     std::string where;
     KsplatLevel level{};
-    int number = 0;  // of the level
+    int number = 0;  // number of the compression level
     double least_harmonic = -1.5, most_harmonic = 1.5;
     std::vector<KsplatSection> sections;
-    bool logarithms = false;  // as the user says of its scales
+    bool logarithms = false;  // the user says that scales are logarithms
     bool scales_below_0 = false;
 
     std::uint32_t word(std::size_t at) const { return load_le<std::uint32_t>(bytes, at); }
@@ -127,7 +127,8 @@ std::optional<std::string> read_layout(KsplatFile& file) {
     return std::nullopt;
 }
 
-/// Of each splat of a section, in order: the full ones, then those whose lengths are listed.
+/// The bucket of each splat of a section, in order: the full buckets, then those whose lengths are
+/// listed.
 std::vector<std::uint32_t> buckets_of(const KsplatFile& file, const KsplatSection& section) {
     std::vector<std::uint32_t> bucket(section.splats);
     const auto full = std::min(section.splats, section.full_buckets * section.bucket_size);

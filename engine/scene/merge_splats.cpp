@@ -4,12 +4,12 @@
 // index, so that the number of threads changes nothing.
 #include "engine/scene/merge_splats.h"
 
+#include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
-#include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <nanoflann.hpp>
@@ -33,7 +33,8 @@ namespace {
 
 constexpr std::size_t kNearest = 6;
 constexpr std::size_t kRoundDivisor = 4;  // a round merges at most a fourth of the splats
-constexpr std::size_t kAlongCurve = 2;    // of a quick merge: so many neighbours, of later splats
+constexpr std::size_t kAlongCurve = 2;    // quick: this many later splats on the curve are
+                                          // neighbours
 constexpr std::size_t kCurveSplats = 64;  // splats of one code of the curve
 constexpr double kApart = 1e-3;
 constexpr std::size_t kBlock = 1 << 15, kPart = 256;  // splats between reports, of a thread at once
@@ -80,7 +81,7 @@ class Merging {
   public:
     Merging(const SplatModel& model, std::size_t last, const MergeOptions& options);
     void merge_to(std::size_t count);
-    /// Of the splats as they are now.
+    /// The model of the splats as they are now.
     SplatModel level() const;
 
   private:
@@ -352,7 +353,7 @@ Covariance2 projection(const Symmetric3& c, int axis) {
 /// A splat as a picture along an axis sees it.
 struct Blob {
     Covariance2 covariance;
-    double root;  // of the determinant
+    double root;  // square root of the determinant
     double x, y, opacity;
 };
 

@@ -1,10 +1,10 @@
 #include "engine/scene/ply.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
@@ -272,7 +272,7 @@ const SplatFormatRow& ply_format() {
 
 namespace {
 
-/// Of "Key: value" or "Key value"; empty where the comment has another key.
+/// The value in "Key: value" or "Key value"; empty where the comment has another key.
 std::string_view value_of(std::string_view comment, std::string_view key) {
     if (lower(comment.substr(0, key.size())) != lower(key)) return {};
     comment.remove_prefix(key.size());
@@ -297,7 +297,8 @@ int kernel_defined_by(std::string_view name, std::string_view function, const st
         notes);
 }
 
-/// Of a kernel of one's own: what makes it here, and what draws it in a program that has no fit.
+/// Comments on a user's own kernel: what defines it here, and what draws it in a program that
+/// cannot fit one.
 std::string function_comments(const SplatModel& model) {
     const KernelDefinition* definition = kernel_definition(model.kernel);
     if (definition == nullptr) return {};
@@ -545,7 +546,7 @@ const double* translate_row(const PlyColumns& columns, const double* values,
     const bool as_3dgs = columns.of[kLogScale][2] < static_cast<int>(columns.count);
     if (as_3dgs && !columns.dc_is_byte && columns.filter < 0) return values;
     row.assign(values, values + columns.count);
-    row.push_back(-LOG_SCALE_LIMIT);  // of the axis that the file may lack
+    row.push_back(-LOG_SCALE_LIMIT);  // for an axis that the file may lack
     double* at = row.data();
     if (columns.dc_is_byte)
         for (const int column : columns.of[kShDc]) at[column] = dc_of_colour(at[column] / 255);

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 20;
 constexpr std::size_t kMostShown = 40;                  // bytes of a word
 constexpr std::size_t kMostFirstLine = 100;             // bytes
-constexpr std::string_view kUtf8Mark = "\xef\xbb\xbf";  // of text, before it begins
+constexpr std::string_view kUtf8Mark = "\xef\xbb\xbf";  // byte order mark before UTF-8 text
 constexpr std::size_t kProgressRows = 1 << 16;          // between two reports
 std::size_t type_size(PlyType type) {
     switch (type) {
@@ -391,7 +391,7 @@ std::size_t read_ply_rows(std::span<const std::byte> file, const PlyHeader& head
     check_ply_size(file, header, element, where);
     RowReader reader(file, header, where);
     for (const PlyElement& candidate : header.elements) {
-        if (candidate.properties.empty()) continue;  // of any number of rows
+        if (candidate.properties.empty()) continue;  // takes no bytes, however many rows it has
         std::vector<double> values(candidate.properties.size());
         const bool wanted = &candidate == &element;
         for (std::size_t i = 0; i < candidate.count; ++i) {

@@ -8,8 +8,8 @@ namespace darb {
 namespace {
 
 constexpr std::size_t kFewest = 20;  // points
-// Added to the diagonal, as a share of it: directions that shift the picture by less than a tenth
-// of what turn and move do one by one make no longer steps.
+// Added to the diagonal, as a share of it, so that steps stay bounded along directions in which the
+// picture shifts by less than a tenth of what turn and move would shift it separately.
 constexpr double kDamping = 1e-2;
 
 glm::dmat3 cross_matrix(const glm::dvec3& v) {  // columns

@@ -1,5 +1,9 @@
 #include "engine/scene/sog.h"
 
+#include <fmt/format.h>
+#include <webp/decode.h>
+#include <webp/encode.h>
+#include <zip.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,7 +11,6 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <fmt/format.h>
 #include <functional>
 #include <future>
 #include <limits>
@@ -18,9 +21,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-#include <webp/decode.h>
-#include <webp/encode.h>
-#include <zip.h>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -65,7 +65,7 @@ using nlohmann::json;
 
 constexpr std::size_t kPaletteRow = 64;         // entries a row of shN_centroids
 constexpr std::size_t kMostPalette = 65536;     // entries
-constexpr std::size_t kSparePixels = 1u << 20;  // of the pictures, beyond four times the splats
+constexpr std::size_t kSparePixels = 1u << 20;  // pictures may hold four times the splats and this
 constexpr std::uint64_t kSplatBytes = 4 * splat_floats(kMaxShDegree);
 
 using Codebook = std::array<float, 256>;
@@ -381,7 +381,7 @@ std::vector<std::byte> read_entry(zip_t* archive, const std::string& name, std::
     return bytes;
 }
 
-/// Of a scene that has to be unpacked first; empty where there is none.
+/// The name of a scene in the archive, which has to be unpacked first; empty where there is none.
 std::string packed_scene(zip_t* archive) {
     for (zip_int64_t i = 0; i < zip_get_num_entries(archive, 0); ++i)
         if (const char* name = zip_get_name(archive, static_cast<zip_uint64_t>(i), 0))
@@ -486,8 +486,8 @@ using nlohmann::json;
 constexpr std::size_t kChunkNeighbours = 256;  // splats that lie close together, for chunk_order
 constexpr std::size_t kRowEntries = 64;        // palette entries a row of pixels
 constexpr std::size_t kPaletteStep = 1024, kMostSteps = 64;
-constexpr int kWebpEffort = 4;            // of 9
-constexpr std::size_t kMostSide = 16383;  // px, of WebP
+constexpr int kWebpEffort = 4;            // on libwebp's scale to 9
+constexpr std::size_t kMostSide = 16383;  // WebP's limit, px
 
 /// Its pixels are set one by one; those that are not are 0 0 0 255.
 struct Plane {

@@ -1,9 +1,9 @@
 #include "engine/scene/spz.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <fmt/format.h>
 #include <numbers>
 
 #include "engine/core/error.h"
@@ -334,7 +334,7 @@ using Stream = std::vector<std::byte>;
 constexpr int kUsualBits = 12;   // fractional; 0.24 mm where the unit is a metre
 constexpr int kLeastSteps = 17;  // 2^17 of them across the largest coordinate, where they fit
 constexpr int kSteps = 23;       // 24 bits with sign
-constexpr int kCoarsestOfDegree1 = 8, kCoarsestOfHigher = 16;  // of the reference writer
+constexpr int kCoarsestOfDegree1 = 8, kCoarsestOfHigher = 16;  // as in the reference writer
 
 // Where bytes end, and half a step of each, which is rounding.
 constexpr double kLeastLogScale = -10, kMostLogScale = 255 / 16.0 - 10, kHalfLogScale = 1 / 32.0;

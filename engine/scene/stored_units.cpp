@@ -28,17 +28,17 @@ constexpr double kRounded = 0.02;
 constexpr std::size_t kMostSampled = 20'000;        // splats, of medians
 constexpr std::size_t kMostNeighbours = 1'000'000;  // splats among which neighbours are looked for
 constexpr std::size_t kProbes = 128;                // splats whose neighbours are looked for
-// Of rotations.
+// Thresholds for rotations.
 constexpr double kMostOfOneComponent = 0.5;  // share of the squares
 constexpr std::size_t kFlatProbes = 2000, kLeastFlat = 100, kMostBeside = 30'000;
 constexpr double kFlat = 0.7;      // the shortest axis is half as long as the next
-constexpr double kDeviations = 3;  // of the mean from 0
-// Of harmonics: those of photos have 0.6 to 0.9, read in the wrong order 0.
+constexpr double kDeviations = 3;  // the mean must be this many standard errors from 0
+// Correlation of harmonics: those of photos have 0.6 to 0.9, and 0 when read in the wrong order.
 constexpr double kCorrelated = 0.4;
 constexpr std::size_t kLeastCorrelated = 100;  // splats
 constexpr double kLargestLogit = 20;
 constexpr double kLeastOfColours = 0.4;  // all of a scene within less is plain
-constexpr double kLargestDc = 20;        // of a colour six times as bright as white
+constexpr double kLargestDc = 20;        // a colour six times as bright as white
 // Steps of positions, of a splat's size. Formats of few bits round on purpose, and by less than
 // half of a splat it does not show.
 constexpr double kCoarseFloat = 0.1, kCoarseFormat = 0.5;

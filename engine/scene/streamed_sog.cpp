@@ -31,9 +31,9 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr int kMostLodDepth = 256;              // of the JSON
-constexpr std::size_t kLeafSplats = 16 << 10;   // of the finest level, at most
-constexpr std::size_t kFileSplats = 256 << 10;  // of a file; a leaf is never cut
+constexpr int kMostLodDepth = 256;              // nesting of the JSON
+constexpr std::size_t kLeafSplats = 16 << 10;   // most splats in a leaf of the finest level
+constexpr std::size_t kFileSplats = 256 << 10;  // splats per file; a leaf is never split
 constexpr std::size_t kLeastLevel = 500;        // splats
 constexpr std::size_t kLeafNeighbours = 256;    // for chunk_order
 
@@ -202,14 +202,14 @@ struct LodWriter {
     EncodeOptions options;
     std::string where;
     std::vector<std::vector<std::uint32_t>> filling;  // splats of each level's last file, in order
-    std::vector<std::size_t> files;                   // of each level
+    std::vector<std::size_t> files;                   // number of files, by level
     std::vector<std::size_t> counts;
     std::size_t written = 0, all = 0;  // splats of all levels
     json filenames = json::array();
     EncodedSplats encoded;
 };
 
-using LodSplats = std::vector<std::vector<std::uint32_t>>;  // of each level
+using LodSplats = std::vector<std::vector<std::uint32_t>>;  // [level] indices of splats
 
 json bound_of(const LodWriter& writer, const LodSplats& splats) {
     glm::dvec3 low(1e300), high(-1e300);

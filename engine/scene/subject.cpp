@@ -16,14 +16,16 @@ namespace {
 constexpr std::size_t kSplatsOfDensity = 100'000, kSplatsOfDepth = 20'000, kMostCameras = 64;
 constexpr float kLogitOfTenth = -2.2f;
 constexpr double kTail = 0.02;       // left out at each end
-constexpr double kReach = 2.5;       // of the median distance: what is farther is background
-constexpr int kMostRounds = 20;      // of leaving out, and of weighing
-constexpr int kCells = 16;           // each way, of the middle half of a picture, for depths
+constexpr double kReach = 2.5;       // times the median distance: what is farther is background
+constexpr int kMostRounds = 20;      // rounds in which splats are left out, or axes reweighted
+constexpr int kCells = 16;           // per side, over the middle half of a picture, for depths
 constexpr double kOpaque = 0.7;      // optical depth of half the light
-constexpr double kPrior = 0.03;      // weight of the depth that is seen, of that of the axes
-constexpr double kLeastMiss = 0.02;  // of the usual depth: an axis that passes as near hits
-constexpr double kAhead = 0.1;    // of the depth that is seen: nearer is not in front of a camera
-constexpr double kFarthest = 10;  // of the depth that is seen: farther is not what is looked at
+constexpr double kPrior = 0.03;      // weight of the seen depth, relative to that of the axes
+constexpr double kLeastMiss = 0.02;  // share of the median depth: an axis that passes as near
+                                     // counts as a hit
+constexpr double kAhead = 0.1;       // share of the seen depth: a nearer point is not in front of a
+                                     // camera
+constexpr double kFarthest = 10;  // times the seen depth: a farther point is not what is looked at
 constexpr double kAgree = 0.6;    // share of the cameras that have the point in front of them
 constexpr double kOneWay = 0.5;   // length of the mean of their directions
 
@@ -104,7 +106,7 @@ std::optional<double> surface_of(std::vector<Seen>& cell) {
 /// A camera that sees something.
 struct Looking {
     const Camera* camera;
-    double depth;  // of what it sees
+    double depth;  // median depth of the splats it sees
 };
 
 std::vector<Looking> looking_cameras(const SplatModel& model, std::span<const Camera> cameras) {
@@ -241,7 +243,7 @@ std::optional<double> seen_depth(const SplatModel& model, const Camera& camera) 
         const double x = (camera.fx * at.x / at.z + camera.cx - 0.25 * camera.width) / side_x;
         const double y = (camera.fy * at.y / at.z + camera.cy - 0.25 * camera.height) / side_y;
         if (!(x >= 0 && x < kCells && y >= 0 && y < kCells)) continue;
-        // Of an ellipse of one standard deviation, twice: the integral of a Gaussian.
+        // Twice the area of the ellipse at one standard deviation: the integral of a Gaussian.
         const double log_area = double{s[0]} + s[1] + s[2] - std::min({s[0], s[1], s[2]});
         const double area = 2 * std::numbers::pi * std::exp(std::min(log_area, 50.0)) * camera.fx *
                             camera.fy / (at.z * at.z * side_x * side_y);
@@ -334,7 +336,7 @@ double footing(const std::vector<Standing>& splats, int axis, double from, doubl
     return weight * std::sqrt(std::max(variance, 0.0));
 }
 
-/// Of the ends of an axis.
+/// A value for each end of an axis.
 struct Ends {
     double low = 0, high = 0;
 };

@@ -20,9 +20,10 @@ constexpr size_t kFewPoints = 10;                // too few for a range of depth
 constexpr size_t kLookedAt = 400;                // points of a view
 constexpr double kNearer = 0.7, kFarther = 1.6;  // than the points
 constexpr double kStray = 0.02;         // share of the points at each end that may be wrong
-constexpr double kNearestShare = 0.05;  // of the way to the middle of the region
+constexpr double kNearestShare = 0.05;  // share of the distance to the middle of the region
 constexpr double kGoodAngle = 12, kBelow = 6, kAbove = 12;  // degrees
-constexpr double kLeastShare = 0.05;                        // of what a photo shows, for a source
+constexpr double kLeastShare = 0.05;                        // a source shows at least this share of
+                                                            // what the photo shows
 constexpr std::uint8_t kOpaque = 128;
 
 ImageF grey_of(const ImageU8& rgba) {
@@ -179,7 +180,7 @@ std::vector<StereoPhoto> stereo_photos(const Dataset& dataset, const std::vector
 namespace {
 
 constexpr int kStarts = 12, kSweeps = 4;
-constexpr float kFirstReach = 0.04f;  // of the random changes; half of it in each further sweep
+constexpr float kFirstReach = 0.04f;  // size of the random changes; halved in each further sweep
 constexpr double kSteepest = 4;       // tangent of the angle between surface and picture, at most
 
 glm::dmat3 intrinsics(const Camera& c) {
@@ -199,7 +200,7 @@ void add_greys(const ImageF& grey, std::vector<std::uint32_t>& words) {
                             byte(x + 1, y + 1) << 24);
 }
 
-// Of the photo and of its sources, one after the other.
+// The greys of the photo and of its sources, one after the other.
 std::vector<std::uint32_t> greys_of(const std::vector<StereoPhoto>& photos, std::size_t reference) {
     std::vector<std::uint32_t> words;
     add_greys(photos[reference].grey, words);
