@@ -21,8 +21,9 @@ struct CheckOptions {
 /// All rows, in order; each also goes to on_row when it is ready.
 std::vector<Row> run_checks(Device& device, const CheckOptions& options, const OnRow& on_row);
 
-// Its parts.
-// Checks all listed kernels, including those with several pulses, or just one.
+// The parts of run_checks().
+
+/// Checks all listed kernels, including those with several pulses, or just one.
 std::vector<Row> check_kernels(Device& device, std::optional<int> kernel = std::nullopt);
 std::vector<Row> check_scan_and_sort(Device& device);
 std::vector<Row> check_loss(Device& device);
