@@ -28,8 +28,8 @@ struct Row {
 /// Called with each row when it is ready.
 using OnRow = std::function<void(const Row&)>;
 
-/// scaled: the absolute tolerance, and the error in the row, are in units of the root mean square
-/// of the expected values.
+/// scaled: the absolute tolerance, and the error in the row, are in units of the root mean
+/// square of the expected values.
 Row compare_row(const std::string& group, const std::string& name, std::span<const double> expected,
                 std::span<const double> got, const reference::Tolerance& tolerance,
                 bool scaled = false);

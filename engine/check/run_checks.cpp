@@ -35,7 +35,7 @@ std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt)
         if (has_exact_footprint(*one)) footprints.push_back({*one, Footprint::exact});
         return footprints;
     }
-    if (!every)  // the kernels of the paper, an exact footprint, the built-in exp, shapes
+    if (!every)  // the paper's kernels, an exact footprint, the built-in exp, shapes
         return {{KERNEL_GAUSSIAN},
                 {KERNEL_RAISED_COSINE},
                 {KERNEL_HALF_COSINE_SQUARED},
@@ -48,7 +48,8 @@ std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt)
                 {KERNEL_GES_PUBLISHED},
                 {blend_of(KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE)}};
     std::vector<Variant> all;
-    std::vector<int> shaped = shaped_kernels();  // and blends: smooth, and with jump and kink
+    std::vector<int> shaped = shaped_kernels();  // plus two blends: a smooth one, and one with a
+                                                 // jump and a kink
     shaped.push_back(blend_of(KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE));
     shaped.push_back(blend_of(KERNEL_SINC, KERNEL_INVERSE_QUADRATIC));
     for (const int kernel : shaped)
@@ -110,7 +111,7 @@ std::vector<Row> run_checks(Device& device, const CheckOptions& options, const O
     return checks.take();
 }
 
-// The parts of run_checks that are no whole walk: kernels, scan and sort, loss.
+// The parts of run_checks that are not whole walks: kernels, scan and sort, loss.
 
 namespace {
 
@@ -161,8 +162,9 @@ Row value_row(Device& device, int kernel, Footprint footprint, Row& slope_row) {
     return row;
 }
 
-// Whether q is within rounding of an edge, or of a jump, of the kernel or of what it blends; there,
-// and a thousandth before the edge of a footprint that is a root there, slopes are not compared.
+// Whether q is within rounding of an edge, or of a jump, of the kernel or the kernels it blends.
+// There, and within a thousandth before the edge of a footprint that falls like a root, slopes are
+// not compared.
 bool near_edge(int kernel, double q, bool jumps) {
     const auto parts = blend_parts(kernel);
     for (const int k :
@@ -322,8 +324,8 @@ std::vector<Row> check_loss(Device& device) {
 
 namespace {
 
-// Dense; but sparse where the kernel jumps at its edge, for there every pixel that rounding moves
-// across the edge changes by a tenth of the opacity.
+// A dense scene, but a sparse one where the kernel jumps at its edge, because there every pixel
+// that rounding moves across the edge changes by a tenth of the opacity.
 reference::TestScene walk_scene(int kernel, Footprint footprint) {
     if (footprint == Footprint::psi && kernel_profile(kernel).edge_order == 0)
         return reference::random_scene(
@@ -356,7 +358,8 @@ std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int
                     evaluation == EVALUATION_BUILTIN ? ", built-in" : "");
     const bool steep = footprint == Footprint::exact && ends_with_a_jump(kernel);
     const char* allowed = steep ? "gradient_steep_float32" : "gradient_scaled_float32";
-    // Image, every gradient and the mean gradient of the device or of the reference in float.
+    // Rows for image, every gradient and the mean gradient, of the device or of the reference in
+    // float.
     const auto compared = [&](const auto& image, const auto& got) {
         std::vector<Row> rows{compare_row(group, "image", truth.image, image, "image_float32")};
         for (int a = 0; a < kAttributeCount; ++a)

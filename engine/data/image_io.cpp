@@ -183,13 +183,6 @@ std::string picture_name(const std::string& view_name, std::set<std::string>& us
 // Must follow jpeglib.h.
 #include <jerror.h>
 
-#include <algorithm>
-#include <array>
-#include <vector>
-
-#include "engine/core/error.h"
-#include "engine/data/photo_decoder.h"
-
 namespace darb {
 
 namespace {

@@ -1,6 +1,6 @@
-// What the decoders of PNG and JPEG share: the size that a file claims is checked before anything
-// of that size is allocated. Photos come from strangers, so the decoding itself is left to libpng
-// and libjpeg-turbo, which the distribution maintains.
+// What the decoders of PNG and JPEG share: the size that a file claims is checked before
+// anything of that size is allocated. Photos come from strangers, so the decoding itself is left to
+// libpng and libjpeg-turbo, which the distribution maintains.
 #pragma once
 
 #include <cstddef>

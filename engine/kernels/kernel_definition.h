@@ -45,11 +45,11 @@ struct ProfileFault : Error {
 };
 
 /// Makes a kernel from any profile: w(q) for q in (0, support). w need not be defined at 0, where
-/// its limit is taken. It is divided by w(0), with a note, where that is not 1. Where no polynomial
-/// of the shaders' degrees is accurate to float rounding, the nearest one is used, with a note on
-/// its error. support may be infinity for exp(-q/2). An empty name becomes one made from a digest
-/// of the kernel. Throws ProfileFault where w is infinite, negative, growing, 0 inside the support,
-/// or not a smooth function of q. Takes about 10 ms.
+/// its limit is taken. It is divided by w(0), with a note, where that is not 1. Where no
+/// polynomial of the shaders' degrees is accurate to float rounding, the nearest one is used, with
+/// a note on its error. support may be infinity for exp(-q/2). An empty name becomes one made from
+/// a digest of the kernel. Throws ProfileFault where w is infinite, negative, growing, 0 inside the
+/// support, or not a smooth function of q. Takes about 10 ms.
 KernelDefinition define_kernel(std::string_view name, double support,
                                const std::function<double(double)>& w, std::string source);
 

@@ -51,9 +51,9 @@ double covariance_scale(int kernel, Footprint footprint);
 /// profile has the same integral over the plane. With several pulses: that of the first.
 double equal_area_scale(int kernel, Footprint footprint);
 
-/// Inverse of the cumulative radial density r^2 w(r^2) of the 3D kernel: u in [0,1) -> r, in units
-/// of the standard deviation parameter. Splits draw their children's offsets from it. gaussian:
-/// chi_3; with several pulses: that of the first.
+/// Inverse of the cumulative radial density r^2 w(r^2) of the 3D kernel: u in [0,1) -> r, in
+/// units of the standard deviation parameter. Splits draw their children's offsets from it.
+/// gaussian: chi_3; with several pulses: that of the first.
 double kernel_radius_quantile(int kernel, double u);
 
 }  // namespace darb

@@ -74,7 +74,7 @@ std::vector<double> slopes_of(const Rows& rows) {
     return slope;
 }
 
-/// Slopes of the spline with these end slopes; nothing where a piece of it would grow.
+/// Slopes of the spline with these end slopes; nothing where some piece would grow.
 std::optional<std::vector<double>> spline_slopes(const Rows& rows, std::vector<double> slope) {
     const std::size_t last = rows.size() - 1;
     const auto step = [&](std::size_t i) { return rows[i + 1].first - rows[i].first; };

@@ -262,7 +262,7 @@ double DerivedKernel::slope(Footprint footprint, double q) const {
 double DerivedKernel::reach(Footprint footprint, double opacity, double cutoff) const {
     if (!(opacity >= cutoff)) return 0;
     double low = 0, high = 1;
-    for (const Pulse& pulse : pulses_)  // the outermost that shows, and there its falling side
+    for (const Pulse& pulse : pulses_)  // the outermost pulse that shows, on its falling side
         if (pulse.peak > 0 && opacity * value(footprint, pulse.peak) >= cutoff) low = pulse.peak;
     high = std::max(high, low);
     while (high < row_.support && opacity * value(footprint, high) >= cutoff) high *= 2;

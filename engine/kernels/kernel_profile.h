@@ -102,7 +102,7 @@ class DerivedKernel {
 
     KernelProfile row_;
     std::vector<Pulse> pulses_;
-    double radius_ = 0;  // of the support or the first pulse, or where the Gaussian is below
+    double radius_ = 0;  // end of the support or the first pulse, or where a Gaussian is below
                          // rounding
     double psi_ = 1, scale_ = 1;
     double radial_mass_ = 1;     // integral of r^2 w(r^2) over the ball of the first pulse

@@ -1,5 +1,6 @@
-// How coarsely a scene may be written: the search that web pages and `darb convert` share. Pictures
-// of the source decide: it takes the coarsest precision at which the worst of 8 views keeps 50 dB.
+// How coarsely a scene may be written: the search that web pages and `darb convert` share.
+// Pictures of the source decide: it takes the coarsest precision at which the worst of 8 views
+// keeps 50 dB.
 #pragma once
 
 #include <cstddef>
@@ -33,8 +34,8 @@ struct PictureLoss {
 /// Pictures of a source from up to 8 of the views, evenly picked, as pinholes of at most 800 px.
 class PictureMeasure {
   public:
-    /// The device must outlive this object. views: at least one. progress: called with the number
-    /// of pictures made so far, here and in compare(); may be empty.
+    /// The device must outlive this object. views: at least one. progress: called with the
+    /// number of pictures made so far, here and in compare(); may be empty.
     using Progress = std::function<void(std::size_t pictures)>;
     PictureMeasure(Device& device, const SplatModel& source, const std::vector<View>& views,
                    const glm::vec3& background, Progress progress = {});

@@ -19,9 +19,9 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kChunk = 256;  // splats, of the order
+constexpr std::size_t kChunk = 256;  // splats, for chunk_order
 constexpr double kMostInteger = 4294967294.0;
-constexpr std::size_t kSample = 1 << 16;  // bytes that decide whether differences are smaller
+constexpr std::size_t kSample = 1 << 16;  // bytes used to decide whether differences are smaller
 
 using Values = std::function<double(std::size_t)>;
 
@@ -49,7 +49,7 @@ int bytes_of(const std::vector<std::uint32_t>& integers) {
     return std::max(1, (static_cast<int>(std::bit_width(any)) + 7) / 8);
 }
 
-/// The planes of integers, or of the sample in their middle.
+/// The planes of the integers, or of the sample in their middle.
 std::vector<std::byte> planes_of(const std::vector<std::uint32_t>& integers, int bytes,
                                  std::size_t most) {
     const std::size_t count = std::min(integers.size(), most);
@@ -88,7 +88,7 @@ void add_rounded(int attribute, int component, double step, const Values& value,
     }
     if (to.count == 0) low = high = 0;
     step = std::max(step, (high - low) / kMostInteger);
-    low = std::floor(low / step) * step;  // so that 0 is a step
+    low = std::floor(low / step) * step;  // so that 0 is on a step
     std::vector<std::uint32_t> integers(to.count);
     for (std::size_t i = 0; i < to.count; ++i)
         integers[i] =

@@ -17,9 +17,9 @@ struct PagePrecision {
     double position = 0;             // as a share of a typical splat's second largest standard
                                      // deviation
     double log_scale = 0;            // natural logarithm
-    double rotation = 0;             // of each component of the unit quaternion
+    double rotation = 0;             // for each component of the unit quaternion
     double opacity = 0, colour = 0;  // both 0 to 1
-    double harmonics = 0;            // of coefficients above the first
+    double harmonics = 0;            // for coefficients above the first
 };
 
 /// Level 0 is the coarsest; each level halves the steps of the one before; kPageLevels and above

@@ -53,8 +53,8 @@ std::unique_ptr<Ranks> start_ranks();
 /// The MPI that this program was built with, as text; empty: none.
 std::string mpi_name();
 
-/// Runs work() with start_ranks(). Where there are several ranks, an exception from work() ends all
-/// of them: see Ranks::fail.
+/// Runs work() with start_ranks(). Where there are several ranks, an exception from work() ends
+/// all of them: see Ranks::fail.
 int with_ranks(const std::function<int(Ranks&)>& work);
 
 /// Ranks that consist of this process alone.

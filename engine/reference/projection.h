@@ -92,7 +92,7 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
 template <class T>
 struct RotationTerms {
     Vec4<T> unit{0};  // w x y z of the normalised quaternion
-    T norm = 0;       // of the quaternion as stored
+    T norm = 0;       // that of the quaternion as stored
     Mat3<T> matrix{1};
 
     T w() const { return unit[0]; }
@@ -140,7 +140,7 @@ struct CovarianceTerms {
     Vec3<T> r1{0}, r2{0};  // rows of M = root J W R diag(scale), px
     T shrink = 1;          // power of two that brings rows beyond ROW_LIMIT below 2 px
     T det_sharp = 0;       // |r1 x r2|^2: determinant before the low-pass, px^4 times shrink^4
-    T det = 0;             // of S', px^4 times shrink^4
+    T det = 0;             // det S', px^4 times shrink^4
 };
 
 template <class T>

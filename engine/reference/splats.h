@@ -56,7 +56,8 @@ struct RenderSettings {
     double transmittance_stop = TRANSMITTANCE_STOP;
     double background[3] = {0, 0, 0};
     // The accuracy settings of the device; the defaults give the truth.
-    int polynomial_degree = 0;      // of the kernel, see KernelTable; 0: the profile itself
+    int polynomial_degree = 0;  // degree in place of the profile, see KernelTable; 0: the profile
+                                // itself
     int storage = STORAGE_FLOAT32;  // STORAGE_FLOAT16 rounds what the device stores as halves, and
                                     // takes the rounding as the identity on the way back
     int depth_order = DEPTH_ORDER_CENTRE;

@@ -42,8 +42,8 @@ Camera halved(const Camera& camera);
 class Upsample {
   public:
     explicit Upsample(Device& device);
-    /// Records the pass. image: float [3][H][W] at the size of `rendered`. Returns one at the size
-    /// of `shown`, valid until the next call.
+    /// Records the pass. image: float [3][H][W] at the size of `rendered`. Returns one at the
+    /// size of `shown`, valid until the next call.
     const Buffer& record(Commands& commands, const Buffer& image, const Camera& rendered,
                          const Camera& shown);
 

@@ -14,8 +14,8 @@
 namespace darb {
 
 /// Whether the bytes look like .splat. The format has no signature, so this checks that 32 divides
-/// the length, and that the first thousand records have finite positions and scales, and rotations
-/// of length 1.
+/// the length, and that the first thousand records have finite positions and scales, and
+/// rotations of length 1.
 bool looks_like_dot_splat(std::span<const std::byte> file);
 
 /// Drops splats with NaN, infinity or a negative scale, and counts them in *dropped. Scale 0

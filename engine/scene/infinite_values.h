@@ -1,7 +1,7 @@
 // Infinite parameters that are meaningful, with one rule for all readers. A logit of +-infinity is
-// an opacity of 1 or 0 (PLYs expanded from formats with one byte of opacity have it); a log scale
-// of -infinity is a splat without extent on that axis. They are replaced by the limits to which the
-// passes clamp them. NaN and every other infinity stay, and such splats are dropped.
+// an opacity of 1 or 0 (PLYs expanded from formats with one byte of opacity have it); a log
+// scale of -infinity is a splat without extent on that axis. They are replaced by the limits to
+// which the passes clamp them. NaN and every other infinity stay, and such splats are dropped.
 #pragma once
 
 #include <cmath>

@@ -56,10 +56,10 @@ struct SplatFile {
 };
 
 /// path: a file in any of the formats, a folder that is a scene, or that folder's scene_file_in.
-/// The content decides. The name counts only for .splat, which has no signature, and for the files
-/// of a folder. units: what the user says about how values are stored. Notes say where values look
-/// as if they were stored in other units than those of 3DGS (stored_units.h). Throws Error naming
-/// file, place, reason and remedy; for a point cloud, it says that it is one.
+/// The content decides. The name counts only for .splat, which has no signature, and for the
+/// files of a folder. units: what the user says about how values are stored. Notes say where values
+/// look as if they were stored in other units than those of 3DGS (stored_units.h). Throws Error
+/// naming file, place, reason and remedy; for a point cloud, it says that it is one.
 SplatModel load_splats(const std::filesystem::path& path, SplatFile* file = nullptr,
                        const StoredUnits& units = {});
 /// Reads a scene from memory. A name that ends in .splat is trusted. folder: where the files are
@@ -113,7 +113,7 @@ struct EncodeOptions {
     AssignRows assign_rows;           // SOG's palette of harmonics; null: on the host
     std::vector<SplatModel> coarser;  // streamed SOG: levels below the scene itself; empty: made by
                                       // merging
-    ClusterProgress progress;         // of SOG's palettes, which take long; may be empty
+    ClusterProgress progress;         // for SOG's palettes, which take long; may be empty
 };
 /// How many precisions the format's writer offers for this scene; 1: there is no choice.
 int precisions_of(SplatFormat format, const SplatModel& model);

@@ -29,7 +29,7 @@ enum SplatFeature : unsigned {
     kKeepsHarmonics = 4,
     kKeepsDoublePositions = 8,  // or `cuts` says what happens to them
     kKeepsUnturned = 16,        // splats without a rotation, which are never drawn
-    kKeepsShape = 32,           // of each splat; other formats refuse kernels with shapes
+    kKeepsShape = 32,           // one per splat; other formats refuse kernels with shapes
 };
 
 struct SplatFormatRow {

@@ -33,8 +33,8 @@ struct StoredUnits {
 void apply_stored_units(const StoredUnits& units, bool by_channel, const std::string& where,
                         SplatModel& model);
 
-/// What is unlike a 3DGS scene in the values as they were read, one sentence each, with the option
-/// of darb that reads them otherwise. Scenes with fewer than 8 splats are not judged. O(N).
+/// What is unlike a 3DGS scene in the values as they were read, one sentence each, with the
+/// option of darb that reads them otherwise. Scenes with fewer than 8 splats are not judged. O(N).
 std::vector<std::string> unit_doubts(const SplatModel& model, bool by_channel);
 
 /// A sentence where positions are coarse compared with the sizes of the splats; else empty. step:

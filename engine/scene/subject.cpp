@@ -30,7 +30,7 @@ constexpr double kAgree = 0.6;    // share of the cameras that have the point in
 constexpr double kOneWay = 0.5;   // length of the mean of their directions
 
 struct Weighed {
-    glm::dvec3 at;  // from the model's origin
+    glm::dvec3 at;  // relative to the model's origin
     double weight;
 };
 
@@ -71,7 +71,7 @@ std::vector<Weighed> opaque_splats(const SplatModel& m, float least_logit) {
     return splats;
 }
 
-/// How far they are from their median, and the median of that.
+/// The distances from their median, and the median of those.
 double distances_to_median(const std::vector<Weighed>& splats, std::vector<double>& distances) {
     glm::dvec3 middle(0.0);
     std::vector<std::pair<double, double>> values(splats.size());
@@ -88,12 +88,12 @@ double distances_to_median(const std::vector<Weighed>& splats, std::vector<doubl
     return weighted_median(values);
 }
 
-/// What is seen of each cell of the picture's middle: depths, nearest first.
+/// A splat in a cell of the picture's middle.
 struct Seen {
-    double depth, covers;  // optical depth of the cell
+    double depth, covers;  // covers: optical depth that it adds to the cell
 };
 
-/// Depth of the first surface in a cell; nothing where light goes through.
+/// Depth of the first surface in a cell; nothing where light passes through.
 std::optional<double> surface_of(std::vector<Seen>& cell) {
     std::sort(cell.begin(), cell.end(),
               [](const Seen& a, const Seen& b) { return a.depth < b.depth; });
@@ -130,7 +130,7 @@ glm::dvec3 median_of(const std::vector<glm::dvec3>& points) {
     return middle;
 }
 
-/// By least squares of the distances to the axes, whose weights fall with them (Cauchy's).
+/// Least squares of the distances to the axes, whose weights fall with distance (Cauchy's weights).
 glm::dvec3 nearest_to_axes(const std::vector<Looking>& looking, const glm::dvec3& seen) {
     glm::dvec3 point = seen;
     std::vector<double> depths, misses(looking.size()), weights(looking.size(), 1.0);
@@ -159,7 +159,7 @@ glm::dvec3 nearest_to_axes(const std::vector<Looking>& looking, const glm::dvec3
     return point;
 }
 
-/// Whether most cameras have it in front of them, where they see something.
+/// Whether most cameras have the point in front of them, at a depth at which they see something.
 bool is_looked_at(const glm::dvec3& point, const std::vector<Looking>& looking) {
     std::size_t ahead = 0;
     for (const Looking& one : looking) {
@@ -169,7 +169,7 @@ bool is_looked_at(const glm::dvec3& point, const std::vector<Looking>& looking) 
     return static_cast<double>(ahead) >= kAgree * static_cast<double>(looking.size());
 }
 
-/// The centre's distance that 98 % of the opaque splats do not exceed.
+/// The distance from the centre that 98 % of the opaque splats do not exceed.
 double reach_of_splats(const SplatModel& model, const glm::dvec3& centre) {
     std::vector<double> distances;
     for (const Weighed& splat : opaque_splats(model, kLogitOfTenth))
@@ -177,7 +177,7 @@ double reach_of_splats(const SplatModel& model, const glm::dvec3& centre) {
     return distances.empty() ? HUGE_VAL : nearest_rank(distances, 1 - kTail);
 }
 
-/// What the frames hold of it.
+/// The radius that the frames show of the subject.
 double radius_of_frames(const Subject& subject, const std::vector<Looking>& looking) {
     std::vector<double> halves, beside;
     for (const Looking& one : looking) {
@@ -254,7 +254,7 @@ std::optional<double> seen_depth(const SplatModel& model, const Camera& camera) 
     std::vector<double> depths;
     for (std::vector<Seen>& cell : cells)
         if (const auto depth = surface_of(cell)) depths.push_back(*depth);
-    if (depths.empty())  // thin everywhere: the middle of what there is
+    if (depths.empty())  // thin everywhere: take the middle of what there is
         for (const std::vector<Seen>& cell : cells)
             for (const Seen& seen : cell) depths.push_back(seen.depth);
     if (depths.empty()) return {};
@@ -319,7 +319,7 @@ struct Standing {
     double weight;
 };
 
-/// Weight of a layer times its width.
+/// The weight of a layer times its width.
 double footing(const std::vector<Standing>& splats, int axis, double from, double to) {
     double weight = 0, square = 0;
     glm::dvec3 sum(0.0);

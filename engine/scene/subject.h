@@ -37,14 +37,14 @@ Subject subject_of(const SplatModel& model, std::span<const Camera> cameras = {}
 
 /// Where the opacity of a scene is. Splats farther than 2.5 times the median distance from the
 /// median are left out, again and again until none is, which removes background and strays. The
-/// centre is the middle between the 2 % and 98 % quantiles of the rest, and the radius holds 98 %
-/// of it. Opacities below 0.1 count only where there is nothing else. At most 100,000 evenly chosen
-/// splats are considered.
+/// centre is the middle between the 2 % and 98 % quantiles of the rest, and the radius holds 98
+/// % of it. Opacities below 0.1 count only where there is nothing else. At most 100,000 evenly
+/// chosen splats are considered.
 Bounds dense_bounds(const SplatModel& model);
 
 /// How far ahead of the camera the point is that its view turns around: where its axis comes
-/// nearest to the subject, if that is ahead and in the picture; else the median depth of the part
-/// of the model that it sees; else the subject's radius.
+/// nearest to the subject, if that is ahead and in the picture; else the median depth of the
+/// part of the model that it sees; else the subject's radius.
 double pivot_depth(const Subject& subject, const SplatModel& model, const Camera& camera);
 
 /// The median depth of the first surface in the middle of the picture, along the axis, world units;

@@ -18,7 +18,7 @@ namespace darb {
 
 struct TrainCostPlan {
     int seeds = 3;
-    int evaluations = 10;    // of the held-out views, evenly spread over a run
+    int evaluations = 10;    // evaluations of the held-out views, evenly spread over a run
     Ranks* ranks = nullptr;  // take turns with the runs; null: this process does all
 };
 
@@ -30,7 +30,7 @@ struct TrainCostRow {
     // changes what is trained rather than how exactly.
     std::optional<Spread> gradient_error;
     Spread ms;                       // per iteration, over the seeds
-    Spread psnr_db;                  // of held-out views at the end
+    Spread psnr_db;                  // on held-out views, at the end
     std::vector<Spread> seconds_to;  // by TrainCostResult::targets; over the seeds that
     std::vector<int> reached;        // reached it
     std::vector<std::pair<double, double>> curve;  // (seconds, PSNR) in the first seed

@@ -81,7 +81,7 @@ struct ComparedRun {
     int exit_code = 0;           // the exit code that failure and notes call for
     std::vector<ComparedAt> at;  // by iteration; for a failed run, those that it reached
     std::vector<CurvePoint> curve;
-    std::optional<double> peak_mb;  // of device memory, over the whole run, 10^6 bytes
+    std::optional<double> peak_mb;  // peak of device memory over the whole run, 10^6 bytes
     std::optional<BlendStatistics> blending;
     std::optional<LearnedShapes> shapes;
 };
@@ -105,10 +105,10 @@ struct Comparison {
 
 enum class RunState { none, partial, finished };
 
-/// What the output folder of a training run holds, given the settings (settings_text) and the list
-/// of cameras it should have. finished: metrics.json of a complete run. partial: only a checkpoint.
-/// Throws Error where the folder has other settings, cameras, numbers of views, or another choice
-/// of held-out views (hold_out_text).
+/// What the output folder of a training run holds, given the settings (settings_text) and the
+/// list of cameras it should have. finished: metrics.json of a complete run. partial: only a
+/// checkpoint. Throws Error where the folder has other settings, cameras, numbers of views, or
+/// another choice of held-out views (hold_out_text).
 RunState run_state(const std::filesystem::path& folder, const std::string& settings,
                    const std::string& cameras, int iterations, std::size_t held_out,
                    const std::string& hold_out = hold_out_text({}));
