@@ -1,4 +1,4 @@
-// What `darb check` finds: a row a quantity, its worst error against its tolerance.
+// What `darb check` finds: one row per quantity, with its worst error and its tolerance.
 #pragma once
 
 #include <functional>
@@ -13,27 +13,27 @@ namespace darb::check {
 
 struct Row {
     std::string group, name;
-    double error = 0;    // at the value that is worst by error over allowed error
-    double allowed = 0;  // there: abs + rel |expected|
+    double error = 0;    // at the value with the largest ratio of error to allowed error
+    double allowed = 0;  // allowed error there: abs + rel |expected|
     size_t count = 0;    // values compared
-    size_t outside = 0;  // of them beyond what is allowed: a boundary band, which is bounded too
-    size_t band = 0;     // how many may be
+    size_t outside = 0;  // values beyond their allowed error: a boundary band, which is limited
+    size_t band = 0;     // how many values may be outside
     bool pass = false;
     std::string detail;  // why it failed; empty where it passed
     double seconds = 0;
-    /// The error, by the same measure, of the reference's own code run in float; where it was run.
+    /// The error of the reference's own code run in float, by the same measure, where it was run.
     std::optional<double> float_alone;
 };
 
-/// Called with each row as it is ready.
+/// Called with each row when it is ready.
 using OnRow = std::function<void(const Row&)>;
 
-/// scaled: the absolute tolerance, and the error in the row, are in units of the root mean square
-/// of the expected values.
+/// scaled: the absolute tolerance, and the error in the row, are in units of the root mean
+/// square of the expected values.
 Row compare_row(const std::string& group, const std::string& name, std::span<const double> expected,
                 std::span<const double> got, const reference::Tolerance& tolerance,
                 bool scaled = false);
-/// The same of any container of numbers.
+/// As above, for any container of numbers.
 template <class Expected, class Got>
 Row compare_row(const std::string& group, const std::string& name, const Expected& expected,
                 const Got& got, const char* tolerance, bool scaled = false) {
@@ -43,7 +43,7 @@ Row compare_row(const std::string& group, const std::string& name, const Expecte
                        scaled);
 }
 
-/// A row that holds or does not; detail says what did not.
+/// A row that passes or fails as a whole; detail says what failed.
 Row fact_row(const std::string& group, const std::string& name, bool holds,
              const std::string& detail);
 

@@ -20,9 +20,9 @@ namespace darb::check {
 /// that the reader keeps, in file order. Throws Error as write_file_atomic does.
 void dump_from_device(Device& device, const SplatModel& model, const Camera& camera,
                       const std::filesystem::path& folder);
-/// The files of it.
+/// The names of these files.
 std::vector<std::filesystem::path> dump_files(const std::filesystem::path& folder);
-/// The same in float64 from the reference.
+/// The same arrays in float64, from the reference.
 void dump_from_reference(const SplatModel& model, const Camera& camera,
                          const std::filesystem::path& folder);
 

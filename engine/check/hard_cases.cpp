@@ -19,8 +19,8 @@ using reference::random_scene;
 using reference::SceneOptions;
 using reference::TestScene;
 
-// A camera that looks along z from the origin of coordinates, and splats at depth 2 unless said
-// otherwise, so that places in the image can be chosen.
+// A camera at the origin that looks along z, and splats at depth 2 unless stated otherwise, so that
+// their places in the image can be chosen.
 struct Stage {
     TestScene scene;
 
@@ -34,8 +34,8 @@ struct Stage {
         scene.model.kernel = kernel;
         scene.model.footprint = footprint;
     }
-    // x, y in px; scale: about the standard deviation in px; not round, so that the rotation has a
-    // gradient.
+    // x, y in px; scale: roughly the standard deviation in px. The splat is not round, so that the
+    // rotation has a gradient.
     void add(double x, double y, double scale, double logit, glm::vec3 colour, double depth = 2) {
         SplatModel& m = scene.model;
         const Camera& c = scene.camera;
@@ -60,8 +60,8 @@ struct Stage {
     }
 };
 
-// One of so many values of a colour, in turn. Not 0: there a colour is cut off, and rounding alone
-// decides whether it has a gradient.
+// Cycles through this many values for a colour. None is 0: there a colour is cut off, and rounding
+// alone decides whether it has a gradient.
 float shade(int i, int count) {
     return static_cast<float>(i % count + 1) / static_cast<float>(count);
 }
@@ -160,7 +160,7 @@ void Cases::projection() {
     far.camera.translation -= far.camera.rotation * far.model.origin;
     add("map_coordinates", "float32 loses millimetres at 1e6", std::move(far));
 
-    TestScene off = random(80, 105);  // float32 positions as a file has them, seen from aslant
+    TestScene off = random(80, 105);  // float32 positions as in a file, seen from aslant
     const glm::dmat3 turn =
         glm::mat3_cast(glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, 3))));
     const glm::dvec3 centre = off.camera.centre(), away(9'000.3, -7'000.7, 8'000.9);
@@ -201,7 +201,7 @@ void Cases::parameters() {
     }
     add("parameter_limits", "overflow of exp", std::move(limits));
 
-    // A needle of ratio 1e9: the picture is right, its gradients in float32 are not.
+    // A needle of ratio 1e9: its picture is right, but its gradients in float32 are not.
     TestScene longest = random(60, 108);
     for (size_t i = 0; i < longest.model.size(); i += 12) longest.model.log_scale[3 * i + 1] = 50;
     add("longest_needle", "overflow of exp", std::move(longest)).gradient = false;
@@ -292,7 +292,7 @@ bool all_finite(const DeviceWalk& walk) {
     return all_finite(walk.image.data);
 }
 
-// Of several rows the one nearest to its tolerance, or the first that failed.
+// The row nearest to its tolerance, or the first that failed.
 Row worst_of(const std::vector<Row>& rows, const std::string& name) {
     Row worst = rows.front();
     const auto ratio = [](const Row& r) { return r.allowed > 0 ? r.error / r.allowed : 0; };
@@ -308,7 +308,7 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kPoison[] = {kNan, kInfinity, -kInfinity, 1e38f, -1e38f};
 
-// n splats more, each a copy of a healthy one with one poisoned parameter that must cull it.
+// Adds n splats, each a copy of a healthy one with one poisoned parameter that must cull it.
 SplatModel poisoned(const SplatModel& healthy, size_t n, std::uint64_t seed) {
     SplatModel m = healthy;
     m.resize(healthy.size() + n);
@@ -320,7 +320,7 @@ SplatModel poisoned(const SplatModel& healthy, size_t n, std::uint64_t seed) {
             const size_t stride = values.size() / m.size();
             for (size_t c = 0; c < stride; ++c) values[i * stride + c] = values[twin * stride + c];
         }
-        if (!m.shape.empty() && i % 6 == 0) {  // infinite ones are held at their bounds
+        if (!m.shape.empty() && i % 6 == 0) {  // infinite ones are clamped to their bounds
             m.shape[i] = kNan;
             continue;
         }
@@ -346,7 +346,7 @@ SplatModel poisoned(const SplatModel& healthy, size_t n, std::uint64_t seed) {
     return m;
 }
 
-// Every gradient as a row.
+// One row for each gradient.
 std::vector<Row> gradient_rows(const WalkTruth& truth, const auto& got, const HardCase& c,
                                const std::string& group) {
     std::vector<Row> rows;

@@ -1,4 +1,4 @@
-// The hard cases: scenes on which renderers of splats are known to break, each with what goes wrong
+// The hard cases: scenes that are known to break renderers of splats, each with what goes wrong
 // elsewhere.
 #pragma once
 
@@ -13,25 +13,27 @@ namespace darb::check {
 
 struct HardCase {
     std::string name;
-    std::string what;  // goes wrong where nothing guards
+    std::string what;  // what goes wrong in a renderer without guards
     reference::TestScene scene;
     WalkSettings settings;
     const char* image_tolerance = "image_float32";
     const char* gradient_tolerance = "gradient_scaled_float32";
-    bool gradient = true;        // compare it with double
-    bool expects_splats = true;  // some must be seen
+    bool gradient = true;        // compare the gradient with double
+    bool expects_splats = true;  // some splats must be visible
 };
 
-/// All scenes in one kernel and footprint. Deterministic.
+/// All scenes with one kernel and footprint. Deterministic.
 std::vector<HardCase> hard_cases(int kernel, Footprint footprint);
 
-/// The case on the device against the reference in double: image, every gradient as one row (the
-/// worst attribute), and that all is finite. float_alone: fill that field of the rows too.
+/// Compares the case on the device with the reference in double: the image, every gradient as one
+/// row (the worst attribute), and that everything is finite. float_alone: also fill that field of
+/// the rows.
 std::vector<Row> check_hard_case(Device& device, const HardCase& hard_case,
                                  const std::string& group, bool float_alone = false);
 
-/// Splats with NaN, infinite, denormal and huge parameters among healthy ones change no bit of the
-/// image that the healthy ones alone give, and no bit of their gradients where they are culled.
+/// Checks that splats with NaN, infinite, denormal and huge parameters among healthy ones change no
+/// bit of the image that the healthy ones alone give and, where they are culled, no bit of their
+/// gradients.
 std::vector<Row> check_poison(Device& device, int kernel, const std::string& group);
 
 }  // namespace darb::check

@@ -35,7 +35,7 @@ std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt)
         if (has_exact_footprint(*one)) footprints.push_back({*one, Footprint::exact});
         return footprints;
     }
-    if (!every)  // the kernels of the paper, an exact footprint, the built-in exp, shapes
+    if (!every)  // the paper's kernels, an exact footprint, the built-in exp, shapes
         return {{KERNEL_GAUSSIAN},
                 {KERNEL_RAISED_COSINE},
                 {KERNEL_HALF_COSINE_SQUARED},
@@ -48,7 +48,8 @@ std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt)
                 {KERNEL_GES_PUBLISHED},
                 {blend_of(KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE)}};
     std::vector<Variant> all;
-    std::vector<int> shaped = shaped_kernels();  // and blends: smooth, and with jump and kink
+    std::vector<int> shaped = shaped_kernels();  // plus two blends: a smooth one, and one with a
+                                                 // jump and a kink
     shaped.push_back(blend_of(KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE));
     shaped.push_back(blend_of(KERNEL_SINC, KERNEL_INVERSE_QUADRATIC));
     for (const int kernel : shaped)
@@ -110,13 +111,13 @@ std::vector<Row> run_checks(Device& device, const CheckOptions& options, const O
     return checks.take();
 }
 
-// The parts of run_checks that are no whole walk: kernels, scan and sort, loss.
+// The parts of run_checks that are not whole walks: kernels, scan and sort, loss.
 
 namespace {
 
 constexpr double kCutoff = 1 / 255.0;
 constexpr double kSlopeRounding = 2e-6;
-// Of shaders/kernels/sine.glsl, which rings take, and of the root of q before it.
+// Rounding of shaders/kernels/sine.glsl, which rings use, and of the root of q before it.
 constexpr double kRingRounding = 2e-6, kRingSlopeRounding = 1e-5;
 
 // q over the support and just around its edge.
@@ -161,8 +162,9 @@ Row value_row(Device& device, int kernel, Footprint footprint, Row& slope_row) {
     return row;
 }
 
-// Whether q is within rounding of an edge, or of a jump, of the kernel or of what it blends; there,
-// and a thousandth before the edge of a footprint that is a root there, slopes are not compared.
+// Whether q is within rounding of an edge, or of a jump, of the kernel or the kernels it blends.
+// There, and within a thousandth before the edge of a footprint that falls like a root, slopes are
+// not compared.
 bool near_edge(int kernel, double q, bool jumps) {
     const auto parts = blend_parts(kernel);
     for (const int k :
@@ -175,7 +177,8 @@ bool near_edge(int kernel, double q, bool jumps) {
     return false;
 }
 
-// Of a kernel with shapes, at one exponent; centre, edge and both sides of it are among the probes.
+// Checks a kernel with shapes at one exponent; the probes include the centre, the edge and both
+// sides of it.
 Row shaped_row(Device& device, int kernel, Footprint footprint, double exponent, Row& slope_row) {
     const std::vector<KernelProbe> probes = ramp(kernel);
     const auto answers = probe_kernel(device, kernel_constants(kernel, footprint), probes,
@@ -321,8 +324,8 @@ std::vector<Row> check_loss(Device& device) {
 
 namespace {
 
-// Dense; but sparse where the kernel jumps at its edge, for there every pixel that rounding moves
-// across the edge changes by a tenth of the opacity.
+// A dense scene, but a sparse one where the kernel jumps at its edge, because there every pixel
+// that rounding moves across the edge changes by a tenth of the opacity.
 reference::TestScene walk_scene(int kernel, Footprint footprint) {
     if (footprint == Footprint::psi && kernel_profile(kernel).edge_order == 0)
         return reference::random_scene(
@@ -355,7 +358,8 @@ std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int
                     evaluation == EVALUATION_BUILTIN ? ", built-in" : "");
     const bool steep = footprint == Footprint::exact && ends_with_a_jump(kernel);
     const char* allowed = steep ? "gradient_steep_float32" : "gradient_scaled_float32";
-    // Image, every gradient and the mean gradient of the device or of the reference in float.
+    // Rows for image, every gradient and the mean gradient, of the device or of the reference in
+    // float.
     const auto compared = [&](const auto& image, const auto& got) {
         std::vector<Row> rows{compare_row(group, "image", truth.image, image, "image_float32")};
         for (int a = 0; a < kAttributeCount; ++a)

@@ -11,18 +11,19 @@
 namespace darb::check {
 
 struct CheckOptions {
-    // Walks and hard cases in all kernels and footprints, and beside them the reference in float;
-    // minutes.
+    // Runs walks and hard cases in all kernels and footprints, and the reference in float beside
+    // them; takes minutes.
     bool every_kernel = false;
-    // Values, walks and hard cases of this kernel alone, in its footprints.
+    // Checks values, walks and hard cases of this kernel alone, in its footprints.
     std::optional<int> kernel;
 };
 
-/// All rows, in order; each also goes to on_row as it is ready.
+/// All rows, in order; each also goes to on_row when it is ready.
 std::vector<Row> run_checks(Device& device, const CheckOptions& options, const OnRow& on_row);
 
-// Its parts.
-/// Of all that are listed, rings included, or of one.
+// The parts of run_checks().
+
+/// Checks all listed kernels, including those with several pulses, or just one.
 std::vector<Row> check_kernels(Device& device, std::optional<int> kernel = std::nullopt);
 std::vector<Row> check_scan_and_sort(Device& device);
 std::vector<Row> check_loss(Device& device);

@@ -1,11 +1,12 @@
-// Error: bad input or a device that cannot go on. Thrown anywhere, caught once in main, which
-// prints "error: WHERE: WHAT" and "  WHAT TO DO", and exits with 2. What is caught before that, to
-// go on in another way, is one of its kinds below.
+// Error: bad input, or a device that cannot go on. It may be thrown anywhere and is caught once, in
+// main, which prints "error: WHERE: WHAT" and "  WHAT TO DO" and exits with status 2. Code that has
+// a fallback catches one of the narrower kinds below instead.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <cstdio>
 #include <cstdlib>
-#include <fmt/format.h>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -15,7 +16,8 @@
 namespace darb {
 
 struct Error : std::runtime_error {
-    /// where: file and record, or device and pass. what: the reason. hint: what the user can do.
+    /// where: file and record, or device and pass. what: the reason. hint: what the user can do
+    /// about it.
     Error(std::string where_, std::string what_, std::string hint_ = {})
         : std::runtime_error(where_ + ": " + what_ + (hint_.empty() ? "" : "\n  " + hint_)),
           where(std::move(where_)),
@@ -27,23 +29,23 @@ struct Error : std::runtime_error {
     std::string hint;
 };
 
-/// There is no room: memory of the device or of the host ran out, a budget of it did, or a limit of
-/// the driver. A smaller attempt may succeed, so this is what an attempt with a fallback catches.
+/// Memory ran out on the device or the host, or a memory budget or a driver's limit was exceeded. A
+/// smaller attempt may succeed, so this is the kind that code with a fallback catches.
 struct NoRoom : Error {
     using Error::Error;
 };
 
-/// The device is gone, and nothing that uses it can succeed: no fallback may catch this.
+/// The device is lost, and nothing that uses it can succeed: no fallback may catch this.
 struct DeviceLost : Error {
     using Error::Error;
 };
 
-/// The hint of what finds bytes that no writer of a format can have meant.
+/// Hint for errors about bytes that no writer of the format can have meant.
 inline constexpr const char* kCopyAgain =
     "The file is damaged or cut off: export or copy it again.";
 
-// Contracts: DARB_CHECK aborts on a bug and prints the expression with the values involved.
-// Bad input is no bug: that throws Error (engine/core/error.h).
+// Contracts: DARB_CHECK aborts on a bug and prints the expression with the values involved. Bad
+// input is not a bug: it throws Error instead.
 
 [[noreturn]] inline void check_failed(const char* file, int line, const char* expression,
                                       const std::string& values) {
@@ -70,12 +72,13 @@ std::string check_values(fmt::format_string<Values...> format, Values&&... value
                                  ::darb::check_values(__VA_ARGS__)); \
     } while (false)
 
-// What a program was at when the system refused it memory or a thread.
+// What the program was doing when the system refused it memory or a thread.
 
 namespace darb {
 
-/// Returns work(). Where that runs out of memory it throws NoRoom, where it cannot start a thread
-/// Error, either naming `what`, a file or a part of the work; other exceptions stay as they are.
+/// Returns work(). Throws NoRoom where work() runs out of memory, and Error where it cannot start a
+/// thread; either names `what`, which is a file or a part of the work. Other exceptions pass
+/// through.
 template <class Work>
 decltype(auto) while_doing(const std::string& what, Work&& work) {
     constexpr const char* kLess =
@@ -85,7 +88,7 @@ decltype(auto) while_doing(const std::string& what, Work&& work) {
         return work();
     } catch (const std::bad_alloc&) {
         throw NoRoom(what, "no memory is left", kLess);
-    } catch (const std::length_error&) {  // more than any memory has
+    } catch (const std::length_error&) {  // more than a container can ever hold
         throw NoRoom(what, "no memory has room for so much", kLess);
     } catch (const std::system_error& e) {
         if (e.code() != std::errc::resource_unavailable_try_again) throw;

@@ -1,15 +1,15 @@
 #include "engine/core/files.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
-#include <fcntl.h>
-#include <fmt/format.h>
 #include <limits>
 #include <new>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <utility>
 
 #include "engine/core/error.h"
@@ -40,7 +40,8 @@ void refuse_others(const std::filesystem::path& path, mode_t mode) {
                     "Name a file.");
 }
 
-/// The kind counts before it is opened, which a pipe makes wait and a device may notice; and after.
+/// Checks the kind of file before opening it, because opening a pipe blocks and a device may react;
+/// and again afterwards.
 int open_to_read(const std::filesystem::path& path) {
     check_is_file(path);
     Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY)};
@@ -71,7 +72,7 @@ Container read_whole(const std::filesystem::path& path, size_t most = kAll) try 
                  "Free memory, or name a smaller file.");
 }
 
-/// PATH.tmp, or PATH.1.tmp and so on where that is somebody's.
+/// A temporary file: PATH.tmp, or PATH.1.tmp and so on where that name is taken.
 struct Temporary {
     explicit Temporary(const std::filesystem::path& target) {
         for (int number = 0; file.fd < 0; ++number) {
@@ -144,7 +145,8 @@ std::string read_text_file(const std::filesystem::path& path) {
 void write_file_atomic(const std::filesystem::path& name, FileParts parts) {
     std::error_code ignored;
     if (name.has_parent_path()) std::filesystem::create_directories(name.parent_path(), ignored);
-    // A pipe or a device is written to; what a link points to is replaced, not the link.
+    // A pipe or a device is written to directly; of a link, the file that it points to is replaced,
+    // not the link.
     const auto kind = std::filesystem::status(name, ignored).type();
     using enum std::filesystem::file_type;
     if (kind == fifo || kind == character || kind == block || kind == socket)

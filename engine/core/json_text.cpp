@@ -11,9 +11,9 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kShown = 20;  // bytes of the text
+constexpr std::size_t kShown = 20;  // bytes of the text that a message quotes
 
-/// What stands at a place of the text, up to the end of its line.
+/// The text from `at` to the end of its line.
 std::string shown_at(std::string_view text, std::size_t at) {
     std::string_view rest = text.substr(std::min(at, text.size()));
     rest = rest.substr(0, std::min(rest.find_first_of("\r\n"), kShown));
@@ -26,7 +26,7 @@ std::string json_fault(std::string_view text, const nlohmann::json::parse_error&
     if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) return "is empty";
     if (text.size() > 1 && (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")))
         return "is text in UTF-16, and JSON is read in UTF-8";
-    // The library counts bytes from 1, and points at the last byte that it read.
+    // The library counts bytes from 1 and points at the last byte it read.
     const std::size_t at = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
     const std::string_view before = text.substr(0, at);
     const auto line = 1 + std::count(before.begin(), before.end(), '\n');
@@ -34,7 +34,7 @@ std::string json_fault(std::string_view text, const nlohmann::json::parse_error&
         before.rfind('\n') == std::string_view::npos ? 0 : before.rfind('\n') + 1;
     if (text.find_first_not_of(" \t\r\n", at) == std::string_view::npos)
         return fmt::format("is no valid JSON: it ends in line {} before it is complete", line);
-    // A word is shown from its beginning.
+    // A word is quoted from its beginning.
     std::size_t word = at;
     const auto is_letter = [](char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; };
     while (word > begin && is_letter(text[word]) && is_letter(text[word - 1])) --word;
@@ -76,7 +76,7 @@ nlohmann::json parse_json_text(std::string_view text, const std::string& where,
         return nlohmann::json::parse(text);
     } catch (const nlohmann::json::parse_error& error) {
         throw Error(where, json_fault(text, error), hint);
-    } catch (const nlohmann::json::exception& error) {  // a number beyond double
+    } catch (const nlohmann::json::exception& error) {  // a number beyond the range of double
         std::string reason = json_reason(error);
         const std::size_t quote = reason.find('\'');
         if (reason.starts_with("number overflow") && quote != reason.npos)

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kUnknown = std::numeric_limits<std::uint64_t>::max();
 
-// Lines of a name, a number and what may follow: "MemAvailable:   123 kB".
+// Parses lines of a name, a number and whatever follows: "MemAvailable:   123 kB".
 std::map<std::string, std::uint64_t> numbers_of(const fs::path& path) {
     std::map<std::string, std::uint64_t> numbers;
     std::ifstream file(path);
@@ -34,32 +34,32 @@ std::uint64_t machine(const fs::path& root) {
     return 1024 * (numbers["MemAvailable:"] + numbers["SwapFree:"]);
 }
 
-// Both versions of control groups have the same in files of other names. With version 1, figures of
-// a group with those below it are prefixed.
+// Both versions of control groups have these figures, in files of different names. In version 1,
+// figures that include the groups below have a prefix.
 struct Names {
     const char *limit, *used, *prefix;
 };
 constexpr Names kVersion1{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_"};
 constexpr Names kVersion2{"memory.max", "memory.current", ""};
 
-// One group; kUnknown where it has no limit, as "max" says.
+// What one group has left; kUnknown where it has no limit ("max").
 std::uint64_t left_in(const fs::path& group, const Names& names) {
     std::uint64_t limit = 0, used = 0;
     std::ifstream limit_file(group / names.limit), used_file(group / names.used);
     if (!(limit_file >> limit) || !(used_file >> used)) return kUnknown;
     auto stat = numbers_of(group / "memory.stat");
-    std::uint64_t kept = 0;  // of files
+    std::uint64_t kept = 0;  // file cache and kernel memory that Linux can reclaim, bytes
     for (const char* name : {"inactive_file", "active_file", "slab_reclaimable"})
         kept += stat[names.prefix + std::string(name)];
-    // Of version 1: the least of the groups above, of which a container may not see the files.
+    // Version 1 only: the smallest limit of the groups above, whose files a container may not see.
     if (stat.contains("hierarchical_memory_limit"))
         limit = std::min(limit, stat["hierarchical_memory_limit"]);
     used -= std::min(kept, used);
     return limit - std::min(used, limit);
 }
 
-// The group and those that it is in. A container sees its own group as the top one, though its name
-// is the one outside; then the folders below are not there.
+// What the group and those that contain it have left. A container sees its own group as the top
+// one, although its name is the one outside; the folders below do not exist then.
 std::uint64_t left_in_all(const fs::path& top, const fs::path& name, const Names& names) {
     std::uint64_t least = left_in(top, names);
     fs::path group = top;
@@ -68,7 +68,7 @@ std::uint64_t left_in_all(const fs::path& top, const fs::path& name, const Names
     return least;
 }
 
-// "4:memory:/name" of version 1, "0::/name" of version 2.
+// "4:memory:/name" in version 1, "0::/name" in version 2.
 std::uint64_t control_groups(const fs::path& root) {
     const fs::path top = root / "sys/fs/cgroup";
     std::uint64_t least = left_in(top, kVersion2);

@@ -1,4 +1,4 @@
-// How much memory the machine has left, and memory that goes back to it.
+// How much memory the machine has left, and how to hand freed memory back to it.
 #pragma once
 
 #include <cstdint>
@@ -6,13 +6,14 @@
 
 namespace darb {
 
-/// Bytes that can be taken before the machine has none: what Linux calls available and its swap, at
-/// most what the control groups of this process leave, a container's among them. What a group keeps
-/// of files counts as free, as Linux gives it back before a group runs out. The largest number
-/// where nothing says. root: whose proc/ and sys/ are read; tests have their own.
+/// Bytes that can still be allocated: the available memory and swap that Linux reports, limited by
+/// what this process's control groups (those of a container included) have left. A group's file
+/// cache counts as free, because Linux drops it before the group runs out. Returns the largest
+/// number where nothing is reported. root: the folder whose proc/ and sys/ are read; tests pass
+/// their own.
 std::uint64_t free_memory(const std::filesystem::path& root = "/");
 
-/// After large things were freed: glibc keeps their pages otherwise.
+/// Returns freed pages to the system, which glibc would keep. Call it after freeing large blocks.
 void give_back_freed_memory();
 
 }  // namespace darb

@@ -1,4 +1,4 @@
-// Work on several threads, as many as the system starts.
+// Work on several threads, or on as many as the system will start.
 #pragma once
 
 #include <algorithm>
@@ -10,9 +10,9 @@
 
 namespace darb {
 
-/// Calls work() on `threads` threads, the caller's among them, and returns when each has returned.
-/// Where the system starts no more they are fewer: work() takes what is left until nothing is.
-/// work() must not throw.
+/// Calls work() on `threads` threads, the caller's among them, and returns when every call has
+/// returned. There are fewer threads where the system will not start that many, so work() must keep
+/// taking pieces until none is left. work() must not throw.
 template <class Work>
 void on_threads(std::size_t threads, const Work& work) {
     std::vector<std::jthread> others;
@@ -24,8 +24,8 @@ void on_threads(std::size_t threads, const Work& work) {
     work();
 }
 
-/// work(first, count) for pieces of [0, size), in any order: for loops that memory bounds, so on
-/// four threads at most, which take what it gives. work() must not throw.
+/// Calls work(first, count) for pieces of [0, size), in any order. Meant for loops limited by
+/// memory bandwidth, so it uses four threads at most. work() must not throw.
 template <class Work>
 void in_pieces(std::size_t size, std::size_t piece, const Work& work) {
     const std::size_t threads = std::min(std::thread::hardware_concurrency(), 4u);

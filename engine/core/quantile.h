@@ -9,7 +9,8 @@
 
 namespace darb {
 
-/// Between neighbours, of sorted values; NaN of none.
+/// The quantile of sorted values, interpolated linearly between neighbours; NaN where there are
+/// none.
 inline double quantile(const std::vector<double>& sorted, double share) {
     if (sorted.empty()) return std::numeric_limits<double>::quiet_NaN();
     const double place = share * static_cast<double>(sorted.size() - 1);
@@ -24,7 +25,7 @@ inline double median(std::vector<double> values) {
     return quantile(values, 0.5);
 }
 
-/// The value whose rank is nearest, of at least one; reorders them.
+/// The value with the nearest rank. `values` must not be empty, and is reordered.
 inline double nearest_rank(std::vector<double>& values, double share) {
     const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());

@@ -1,4 +1,4 @@
-// Pcg32 (O'Neill 2014, XSH-RR 64/32): small, seedable, the same numbers on every platform.
+// Pcg32 (O'Neill 2014, XSH-RR 64/32): small, seedable, and with equal numbers on every platform.
 #pragma once
 
 #include <cmath>
@@ -20,14 +20,14 @@ class Pcg32 {
         const auto rotation = static_cast<std::uint32_t>(old >> 59);
         return (shifted >> rotation) | (shifted << ((32 - rotation) & 31));
     }
-    /// Uniform in [0, 1), 32 bits.
+    /// Uniform in [0, 1), with 32 random bits.
     double uniform() { return next() * 0x1p-32; }
     double uniform(double low, double high) { return low + (high - low) * uniform(); }
     /// Uniform in [0, bound); bound > 0.
     std::uint32_t below(std::uint32_t bound) {
         return static_cast<std::uint32_t>((std::uint64_t{next()} * bound) >> 32);
     }
-    /// Standard normal, Box-Muller.
+    /// Standard normal, by Box-Muller.
     double normal() {
         const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
         return radius * std::cos(6.283185307179586 * uniform());

@@ -11,7 +11,7 @@ namespace darb {
 
 namespace {
 
-// An error of a disk is none of a terminal that is gone.
+// Whether the error means that the reader has gone away, rather than that a disk failed.
 bool nobody_reads(int error) {
     struct stat facts {};
     const bool file = ::fstat(STDOUT_FILENO, &facts) == 0 && S_ISREG(facts.st_mode);
@@ -45,7 +45,8 @@ void tell_text(std::string_view text) {
 void keep_standard_descriptors() {
     for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
         if (::fcntl(fd, F_GETFD) != -1 || errno != EBADF) continue;
-        // The lowest free number, which is this one. To be read alone: writing to it fails.
+        // Takes the lowest free number, which is this one. Opened for reading only, so that writing
+        // to it fails.
         ::open("/dev/null", fd == STDERR_FILENO ? O_WRONLY : O_RDONLY);
     }
 }

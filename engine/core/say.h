@@ -1,5 +1,6 @@
-// What a program says while it works, on stderr: a closed or full stderr is no reason to stop. What
-// it was asked for it tells on stdout: a full disk there counts, a reader that is gone does not.
+// Printing. Progress goes to stderr with say(), where a closed or full stderr is no reason to stop.
+// Results that the user asked for go to stdout with tell(), where a full disk is an error but a
+// reader that has gone away is not.
 #pragma once
 
 #include <fmt/format.h>
@@ -13,29 +14,30 @@
 
 namespace darb {
 
-/// The text as it is, flushed; what cannot be written is lost. Never throws.
+/// Prints the text unchanged and flushes; what cannot be written is lost. Never throws.
 void say_text(std::string_view text) noexcept;
 
-/// Formatted, and printable(): names of files may hold what steers a terminal.
+/// Formats the text and makes it printable(), because file names may contain control characters.
 template <typename... T>
 void say(fmt::format_string<T...> format, T&&... values);
 
-/// Writes to stdout and flushes. Where nobody reads any more (a pipe that was closed, a terminal
-/// that is gone), stdout becomes /dev/null; false, with errno, where it fails otherwise (a full
+/// Writes to stdout and flushes. Where the reader has gone away (a closed pipe or terminal), stdout
+/// becomes /dev/null. Returns false, with errno set, where writing fails for another reason (a full
 /// disk).
 bool write_or_let_go(std::string_view text);
 
-/// What the program was asked for, to stdout: formatted, and printable(). Throws std::system_error
-/// where write_or_let_go() fails.
+/// Prints a result to stdout, formatted and made printable(). Throws std::system_error where
+/// write_or_let_go() fails.
 template <typename... T>
 void tell(fmt::format_string<T...> format, T&&... values);
-/// The same to stdout, or said on stderr; nothing where stream is null.
+/// As above for stdout; as say() for stderr; prints nothing where stream is null.
 template <typename... T>
 void tell(std::FILE* stream, fmt::format_string<T...> format, T&&... values);
-void tell_text(std::string_view text);  // as it is
+void tell_text(std::string_view text);  // unchanged
 
-/// Opens /dev/null for those of stdin, stdout and stderr that are closed: else the next file that
-/// is opened takes their number, and what is printed goes into it. What is written to stdout fails.
+/// Opens /dev/null in place of stdin, stdout or stderr where one is closed. Otherwise the next file
+/// to be opened would take its number and receive what is printed. Writing to a stdout opened in
+/// this way fails.
 void keep_standard_descriptors();
 
 template <typename... T>

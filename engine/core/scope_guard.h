@@ -1,8 +1,8 @@
-// ScopeGuard: what was set for a while is put back, however the scope ends.
+// ScopeGuard: restores something at the end of a scope, however the scope ends.
 //
 //     const Tuning before = device.tuning();
 //     const ScopeGuard restore([&] { device.set_tuning(before); });
-//     device.set_tuning(another);  // until the end of this scope, also where something throws
+// until the end of this scope, even if something throws
 #pragma once
 
 #include <exception>
@@ -10,8 +10,8 @@
 
 namespace darb {
 
-/// Calls `undo` once, at the end of its scope. An exception of `undo` goes on to the caller, as if
-/// it were called there; where another exception is ending the scope, that one goes on instead.
+/// Calls `undo` once, at the end of the scope. An exception from `undo` propagates to the caller,
+/// unless another exception is already ending the scope: then that one propagates.
 template <class Undo>
 class [[nodiscard]] ScopeGuard {
   public:
@@ -26,7 +26,7 @@ class [[nodiscard]] ScopeGuard {
         }
         try {
             undo_();
-        } catch (...) {  // the first failure is the one to tell
+        } catch (...) {  // the first failure is the one to report
         }
     }
 

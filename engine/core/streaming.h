@@ -1,6 +1,6 @@
-// Writes that go past the caches: for what this processor does not read again soon, as buffers of
-// the device. A line is not read before it is written, and what lies in the caches stays there.
-// Where the processor has no such writes they are plain ones.
+// Non-temporal writes, for memory that this processor will not read again soon, such as mapped
+// device buffers. A cache line is not read before it is written, and the caches keep what they
+// hold. On processors without such writes, these are ordinary ones.
 #pragma once
 
 #include <array>
@@ -16,16 +16,17 @@ namespace darb {
 
 constexpr std::size_t kStreamFloats = 4, kStreamBytes = kStreamFloats * sizeof(float);
 
-/// What FloatStream may write to, but for plain(): a multiple of 16 bytes.
+/// Whether FloatStream may write here: the address must be a multiple of 16 bytes, except for
+/// plain().
 inline bool can_stream(const std::byte* to) {
     return reinterpret_cast<std::uintptr_t>(to) % kStreamBytes == 0;
 }
 
-/// Writes floats, and knows whether all that it wrote were finite: as they pass a register anyway,
-/// it costs no second look at them.
+/// Writes floats, and keeps track of whether all of them were finite. The values pass through a
+/// register anyway, so this costs no second pass.
 class FloatStream {
   public:
-    /// Four floats. stream_fence() makes them visible to others.
+    /// Writes four floats. stream_fence() makes them visible to others.
     void four(std::byte* to, const float* from) {
 #if defined(__SSE2__)
         put(to, _mm_loadu_ps(from));
@@ -34,7 +35,7 @@ class FloatStream {
 #endif
     }
 
-    /// One float and three zeros.
+    /// Writes one float and three zeros.
     void one(std::byte* to, const float* from) {
 #if defined(__SSE2__)
         put(to, _mm_load_ss(from));
@@ -50,7 +51,7 @@ class FloatStream {
         if (i < count) plain(to + i * sizeof(float), from + i, count - i);
     }
 
-    /// Through the caches, to anywhere.
+    /// Writes through the caches, to any address.
     void plain(std::byte* to, const float* from, std::size_t count) {
         std::memcpy(to, from, count * sizeof(float));
         for (std::size_t i = 0; i < count; ++i) sum_ += 0 * from[i];
@@ -77,8 +78,9 @@ class FloatStream {
     }
 #endif
 
-    // Of 0 times what was written, which is NaN where that is not finite: the bits together, whose
-    // chain is short, and the sum of the others.
+    // Products of 0 and the values written, which are NaN where a value is not finite: combined bit
+    // by bit with OR for the streamed ones, as that dependency chain is short, and summed for the
+    // others.
     Four marks_{};
     float sum_ = 0;
 };

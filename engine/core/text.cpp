@@ -13,11 +13,12 @@ namespace {
 constexpr std::uint32_t kNoCharacter = 0xffffffff;
 
 struct Character {
-    std::uint32_t code = kNoCharacter;  // of Unicode; of one byte that is no UTF-8, kNoCharacter
+    std::uint32_t code =
+        kNoCharacter;  // Unicode code point; kNoCharacter for a byte that is not UTF-8
     std::size_t bytes = 1;
 };
 
-/// The character that UTF-8 text, which is not empty, begins with; RFC 3629.
+/// The first character of UTF-8 text that is not empty; RFC 3629.
 Character first_character(std::string_view text) {
     const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
     const std::uint8_t lead = byte(0);
@@ -74,7 +75,7 @@ std::string python_string(std::string_view bytes) {
     std::string literal(1, quote);
     while (!bytes.empty()) {
         const Character c = first_character(bytes);
-        if (c.code == kNoCharacter)  // as os.fsdecode marks it
+        if (c.code == kNoCharacter)  // in the way os.fsdecode marks it
             append_escape(0xdc00u + static_cast<std::uint8_t>(bytes[0]), literal);
         else if (c.code == '\\' || c.code == static_cast<std::uint32_t>(quote))
             (literal += '\\') += static_cast<char>(c.code);

@@ -1,4 +1,4 @@
-// Text in files, on the command line and on terminals: ASCII whatever the locale.
+// Text in files, on the command line and on terminals: treated as ASCII whatever the locale.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 namespace darb {
 
-/// With small letters for capitals.
+/// The text with ASCII capitals in lower case.
 inline std::string lower(std::string_view text) {
     std::string lowered(text);
     for (char& c : lowered)
@@ -14,13 +14,13 @@ inline std::string lower(std::string_view text) {
     return lowered;
 }
 
-/// Text with names from files, for a terminal: what would steer it (control characters, marks of
-/// direction, bytes that are no UTF-8) becomes \x1b, \u202e and so on. All else stays; line breaks
-/// stay where lines is true.
+/// Makes text that contains names from files safe for a terminal: control characters, marks of
+/// writing direction and bytes that are not UTF-8 become \x1b, \u202e and so on. Everything else
+/// stays; so do line breaks where `lines` is true.
 std::string printable(std::string_view text, bool lines = false);
 
-/// As Python's ascii() of the name that os.fsdecode gives: a literal in quotes that evaluates to it
-/// and to nothing else, whatever its bytes are.
+/// A quoted Python literal of the name, as ascii(os.fsdecode(name)) gives it. It evaluates to the
+/// name and nothing else, whatever its bytes are.
 std::string python_string(std::string_view bytes);
 
 }  // namespace darb

@@ -1,4 +1,4 @@
-// ByteReader: little-endian binary files read with bounds checks.
+// ByteReader: reads little-endian binary data with bounds checks.
 #pragma once
 
 #include <fmt/format.h>
@@ -22,7 +22,7 @@ class ByteReader {
     ByteReader(std::span<const std::byte> bytes, std::string where)
         : bytes_(bytes), where_(std::move(where)) {}
 
-    /// What is being read, for errors: "image 3 of 10".
+    /// Names what is being read, for error messages: "image 3 of 10".
     void set_record(std::string record) { record_ = std::move(record); }
     std::string where() const { return record_.empty() ? where_ : where_ + ", " + record_; }
     std::size_t left() const { return bytes_.size() - at_; }
@@ -39,7 +39,7 @@ class ByteReader {
         need(count);
         at_ += count;
     }
-    /// Up to and without the closing zero byte.
+    /// Reads up to the terminating zero byte and returns the text without it.
     std::string read_string() {
         const auto* begin = reinterpret_cast<const char*>(bytes_.data() + at_);
         const void* end = left() == 0 ? nullptr : std::memchr(begin, 0, left());
@@ -48,7 +48,8 @@ class ByteReader {
         at_ += text.size() + 1;
         return text;
     }
-    /// A 64-bit count of records of at least `least` bytes, checked against what is left.
+    /// Reads a 64-bit count of records that take at least `least` bytes each, and checks it against
+    /// the bytes left.
     std::size_t read_count(std::size_t least, const char* what) {
         const auto count = read<std::uint64_t>();
         if (count > left() / least)

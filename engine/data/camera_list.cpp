@@ -80,7 +80,7 @@ View parse_view(const json& record, std::string where) {
 constexpr const char* kExportPath =
     "Export the path again from nerfstudio's viewer, with its perspective camera.";
 
-/// 16 or 12 numbers row by row, or 3 to 4 rows of 4.
+/// Reads 16 or 12 numbers row by row, or 3 to 4 rows of 4.
 void read_path_pose(const json& frame, const std::string& where, Camera& camera) {
     const auto matrix = frame.find("camera_to_world");
     if (matrix == frame.end() || !matrix->is_array())
@@ -99,7 +99,7 @@ void read_path_pose(const json& frame, const std::string& where, Camera& camera)
         throw Error(where,
                     fmt::format("camera_to_world has {} numbers, not 16 or 12", numbers.size()),
                     kExportPath);
-    glm::dmat3 axes;  // y up and z back, as OpenGL has them
+    glm::dmat3 axes;  // y up and z backwards, as in OpenGL
     for (int r = 0; r < 3; ++r)
         for (int c = 0; c < 3; ++c)
             axes[c][r] = (c == 0 ? 1 : -1) * numbers[static_cast<std::size_t>(4 * r + c)];
@@ -133,7 +133,7 @@ View parse_path_frame(const json& frame, int width, int height, const std::strin
     return view;
 }
 
-/// Frames a second: as the file says, or by its length.
+/// Frames per second: as the file states them, or from its duration.
 double fps_of(const json& root, std::size_t frames, const std::string& where) {
     const auto given = [&](const char* key) { return root.contains(key) && !root[key].is_null(); };
     const double fps = given("fps") ? number(root, "fps", where)

@@ -1,4 +1,4 @@
-// cameras.json as 3DGS writes it beside a scene, and cameras from whatever a user names.
+// cameras.json, as 3DGS writes it beside a scene, and cameras from any file or folder a user names.
 #pragma once
 
 #include <filesystem>
@@ -11,29 +11,29 @@
 
 namespace darb {
 
-/// A list of {id, img_name, width, height, position, rotation, fx, fy} and, where the principal
-/// point is off the centre, cx and cy; rotation: rows of camera to world. Views have no photo.
-/// Throws Error naming the record.
+/// Parses a list of {id, img_name, width, height, position, rotation, fx, fy} and, where the
+/// principal point is off the centre, cx and cy. rotation has the rows of camera to world. The
+/// views have no photo. Throws Error naming the record.
 std::vector<View> parse_camera_list(std::string_view json, const std::string& where);
-/// A camera_path.json as nerfstudio's viewer exports it: a camera of each frame, named frame_00000
+/// A camera_path.json as nerfstudio's viewer exports it: one camera per frame, named frame_00000
 /// and so on.
 struct NerfstudioPath {
     std::vector<View> views;
     double fps = 24;                 // frames a second
-    std::vector<std::string> notes;  // what of it is not followed, a sentence each
+    std::vector<std::string> notes;  // features of the path that are ignored, one sentence each
 };
-/// None where the text is JSON of something else, or none. Throws Error naming the frame.
+/// Returns nothing where the text is other JSON, or not JSON. Throws Error naming the frame.
 std::optional<NerfstudioPath> parse_nerfstudio_path(std::string_view json,
                                                     const std::string& where);
 std::string format_camera_list(const std::vector<View>& views);
 
-/// Through write_file_atomic.
+/// Writes the list with write_file_atomic.
 void write_camera_list(const std::filesystem::path& path, const std::vector<View>& views);
 
 std::vector<Camera> cameras_of(const std::vector<View>& views);
 
-/// path: a data set folder, a folder with cameras.json, a transforms.json or a cameras.json. Photos
-/// are not required. notes: those of the data set.
+/// Loads cameras from a data set folder, a folder with cameras.json, a transforms.json or a
+/// cameras.json. Photos need not exist. notes: receives the notes of the data set.
 std::vector<View> load_cameras(const std::filesystem::path& path,
                                const DatasetOptions& options = {},
                                std::vector<std::string>* notes = nullptr);

@@ -1,11 +1,11 @@
 #include "engine/data/colmap.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <fmt/format.h>
 #include <limits>
 #include <map>
 #include <utility>
@@ -24,7 +24,7 @@ namespace darb {
 
 namespace {
 
-// Least bytes of a record, for counts.
+// The least size of each kind of record, bytes, to check counts against.
 constexpr std::size_t kCameraBytes = 4 + 4 + 8 + 8 + 3 * 8;
 constexpr std::size_t kImageBytes = 4 + 7 * 8 + 4 + 1 + 8;
 constexpr std::size_t kObservationBytes = 8 + 8 + 8;
@@ -46,7 +46,7 @@ ColmapPose read_colmap_pose(ByteReader& reader) {
 
 int read_size(ByteReader& reader) {
     const auto size = reader.read<std::uint64_t>();
-    return size > 0x7fffffff ? 0 : static_cast<int>(size);  // 0 is refused by check_lens
+    return size > 0x7fffffff ? 0 : static_cast<int>(size);  // check_lens refuses 0
 }
 
 }  // namespace
@@ -151,7 +151,7 @@ ColmapRigs parse_colmap_rigs(std::span<const std::byte> file, const std::string&
         for (std::uint32_t s = 0; s < sensors; ++s) {
             const auto type = reader.read<std::int32_t>();
             const auto id = reader.read<std::uint32_t>();
-            // The first is the reference: the rig's own frame.
+            // The first sensor is the reference: its pose is that of the rig.
             std::optional<ColmapPose> pose;
             if (s == 0)
                 pose = ColmapPose();
@@ -190,7 +190,7 @@ namespace {
 
 constexpr std::string_view kSpace = " \t\r";
 
-/// The lines of a text file, by number from 1.
+/// The lines of a text file, with their numbers, from 1.
 class Lines {
   public:
     Lines(std::string_view text, const std::string& where) : text_(text), where_(where) {
@@ -207,7 +207,7 @@ class Lines {
         ++number_;
         return true;
     }
-    /// The next line that is neither empty nor a comment.
+    /// Goes to the next line that is neither empty nor a comment.
     bool next_record() {
         while (next()) {
             const std::size_t begin = line_.find_first_not_of(kSpace);
@@ -215,7 +215,7 @@ class Lines {
         }
         return false;
     }
-    /// The next line is read again by next.
+    /// Makes next() return the current line again.
     void back() {
         at_ = begin_;
         --number_;
@@ -242,7 +242,7 @@ class Lines {
                         "Export the model again.");
         return value;
     }
-    /// What is left of the line, trimmed.
+    /// The rest of the line, trimmed.
     std::string_view rest() const {
         const std::size_t begin = line_.find_first_not_of(kSpace);
         if (begin == std::string_view::npos) return {};
@@ -269,7 +269,8 @@ float number_or_nan(std::string_view text) {
                : std::numeric_limits<float>::quiet_NaN();
 }
 
-// Only tracks need them: a place that is no number is one that no track has.
+// Only tracks need these, so an observation whose place is not a number becomes NaN, which no track
+// uses.
 void add_observations(Lines& lines, ColmapImage& image) {
     while (!lines.rest().empty()) {
         for (int k = 0; k < 2; ++k)
@@ -278,13 +279,15 @@ void add_observations(Lines& lines, ColmapImage& image) {
     }
 }
 
-/// After a pose: its observations, 3 numbers each, or an empty line where it has none. Some writers
-/// leave empty lines out; the line is then the next pose, of 9 numbers and a name.
+/// Reads the line after a pose: its observations, 3 numbers each, or an empty line where it has
+/// none. Some writers leave the empty line out; the line is then the next pose, which is 9 numbers
+/// and a name.
 void read_observations(Lines& lines, ColmapImage& image) {
-    constexpr std::size_t kPoseNumbers = 9, kProbed = 12;  // a name may be a number, not three
+    constexpr std::size_t kPoseNumbers = 9,
+                          kProbed = 12;  // a name may be one number, but not three
     if (!lines.next()) return;
     if (lines.rest().starts_with('#')) return lines.back();
-    std::size_t words = 0, numbers = 0;  // numbers: of the first words, before any other word
+    std::size_t words = 0, numbers = 0;  // numbers: count of leading words that are numbers
     for (std::string_view rest = lines.rest(); !rest.empty();) {
         const std::size_t end = std::min(rest.find_first_of(kSpace), rest.size());
         if (words < kProbed && numbers == words && is_number(rest.substr(0, end))) ++numbers;
@@ -321,7 +324,7 @@ ColmapRigs parse_colmap_rigs_text(std::string_view file, const std::string& wher
         for (std::uint32_t s = 0; s < sensors; ++s) {
             const std::string_view type = lines.word("the sensor's type");
             const auto id = lines.number<std::uint32_t>("sensor id");
-            // The first is the reference: the rig's own frame.
+            // The first sensor is the reference: its pose is that of the rig.
             std::optional<ColmapPose> pose;
             if (s == 0)
                 pose = ColmapPose();
@@ -407,7 +410,8 @@ PointCloud parse_colmap_points_text(std::string_view file, const std::string& wh
         while (!lines.rest().empty()) {
             points.seen_by.push_back(lines.number<std::uint32_t>("image id of the track"));
             const std::string_view word = lines.word("the point's index in the track");
-            std::uint32_t observation = 0xFFFFFFFFu;  // of no image, where it is no number
+            std::uint32_t observation =
+                0xFFFFFFFFu;  // matches no observation where the word is not a number
             std::from_chars(word.data(), word.data() + word.size(), observation);
             if (observations) observations->push_back(observation);
         }
@@ -418,7 +422,8 @@ PointCloud parse_colmap_points_text(std::string_view file, const std::string& wh
     return points;
 }
 
-// A COLMAP model folder: picks binary or text, reads all three files, checks that they fit.
+// A COLMAP model folder: picks binary or text, reads all three files, and checks that they belong
+// together.
 
 namespace {
 
@@ -427,7 +432,7 @@ bool has_pair(const std::filesystem::path& folder, const char* extension) {
            std::filesystem::is_regular_file(folder / (std::string("images") + extension));
 }
 
-// Where each image saw the points of its tracks, as shares of its sides.
+// Fills seen_at: where each image saw the points of its tracks, as shares of its sides.
 void locate_tracks(const std::vector<std::uint32_t>& observations, ColmapModel& model) {
     std::map<std::uint32_t, const ColmapImage*> images;
     for (const ColmapImage& image : model.images) images[image.id] = &image;
@@ -480,7 +485,7 @@ void read_points(const std::filesystem::path& folder, ColmapModel& model) {
 
 namespace {
 
-/// Whether two poses are one, but for what a text file rounds off.
+/// Whether two poses are equal up to the rounding of a text file.
 bool same_pose(const ColmapPose& a, const ColmapPose& b) {
     constexpr double kRounding = 1e-5;
     double apart = 0;
@@ -492,10 +497,12 @@ bool same_pose(const ColmapPose& a, const ColmapPose& b) {
 
 std::string centre_of(const ColmapPose& pose) {
     const glm::dvec3 c = -(glm::transpose(pose.rotation) * pose.translation);
-    return fmt::format("{:.4g}, {:.4g}, {:.4g}", c.x + 0.0, c.y + 0.0, c.z + 0.0);  // no -0
+    return fmt::format("{:.4g}, {:.4g}, {:.4g}", c.x + 0.0, c.y + 0.0,
+                       c.z + 0.0);  // + 0.0 avoids -0
 }
 
-/// Gives images the poses of their frames and rigs, which COLMAP takes for the truth, too.
+/// Gives images the poses that follow from their frames and rigs, which COLMAP treats as the truth
+/// as well.
 void pose_by_rigs(const ColmapRigs& rigs, const std::vector<ColmapFrame>& frames,
                   const std::filesystem::path& listing, ColmapModel& model) {
     std::map<std::uint64_t, const ColmapFrame*> frame_of;
@@ -525,7 +532,7 @@ void pose_by_rigs(const ColmapRigs& rigs, const std::vector<ColmapFrame>& frames
                                     frame.rig, camera),
                         "The files belong to different models: copy all of one model.");
         const std::optional<ColmapPose>& sensor = rig->second.at(camera);
-        if (!sensor) continue;  // not calibrated: the image's own pose is all there is
+        if (!sensor) continue;  // not calibrated: only the image's own pose is known
         const ColmapPose own{image.rotation, image.translation},
             composed{sensor->rotation * frame.pose.rotation,
                      sensor->rotation * frame.pose.translation + sensor->translation};
@@ -618,7 +625,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The remedy where a photo is in another folder of the project: its name; else empty.
+/// A hint that names the folder of the project where the photo is, when it is not in the expected
+/// one; else empty.
 std::string folder_that_has(const fs::path& root, const std::string& name) {
     for (const fs::path& folder : folders_of(root))
         if (!find_photo(folder, name).empty() || !find_by_end(folder, name).empty())
@@ -626,9 +634,9 @@ std::string folder_that_has(const fs::path& root, const std::string& name) {
     return {};
 }
 
-/// Beside the model or above it, within root; for a model folder given directly (or the folder of
-/// models that it is in) up to two folders above that, too. Where no folder has the name images,
-/// that of those which holds the photo `name`.
+/// Looks beside the model and above it, within root; for a model folder given directly (or the
+/// folder of models that it is in), up to two folders above that as well. Where no folder is named
+/// images, takes the one that holds the photo `name`.
 fs::path find_images_folder(const fs::path& root, const fs::path& model_folder,
                             const std::string& name, const DatasetOptions& options) {
     const fs::path base = tidy_path(fs::absolute(root)),
@@ -657,7 +665,8 @@ fs::path find_images_folder(const fs::path& root, const fs::path& model_folder,
                                                scaled));
 }
 
-/// What else a mapper made beside the model 0: pieces that do not hang together with it.
+/// Notes other models that the mapper made beside model 0: groups of photos that it could not
+/// connect to it.
 void note_siblings(const fs::path& model_folder, std::size_t photos, Dataset& dataset) {
     if (model_folder.filename() != "0") return;
     std::map<fs::path, std::size_t> others;
@@ -675,7 +684,7 @@ void note_siblings(const fs::path& model_folder, std::size_t photos, Dataset& da
                     model_folder.string(), counted(photos, "photo"), list));
 }
 
-/// Photos that are not there by their whole names: by the end of these.
+/// Finds photos that do not exist under their full names by the ends of these.
 void find_photos_by_end(const fs::path& images, const std::string& listing, Dataset& dataset) {
     std::map<fs::path, std::string> used;
     for (const View& view : dataset.views)
@@ -709,7 +718,7 @@ void check_photos(const std::vector<View>& views, const fs::path& root,
     std::size_t missing = 0;
     const View* first = nullptr;
     for (const View& view : views) {
-        check_is_file(view.photo);  // where it is there
+        check_is_file(view.photo);  // throws where something else than a file is there
         if (!fs::is_regular_file(view.photo) && missing++ == 0) first = &view;
     }
     const std::string other = first ? folder_that_has(root, first->name) : "";
@@ -746,7 +755,7 @@ Dataset load_colmap(const fs::path& root, const fs::path& model_folder,
     for (View& view : dataset.views)
         if (view.photo.empty()) view.photo = images / view.name;
     if (options.require_photos) check_photos(dataset.views, root, model_folder);
-    // Beside the folder of the photos; where they lie with the model, that is the folder itself.
+    // Masks lie beside the folder of the photos, or in it where the photos lie with the model.
     const bool with_model = images.filename() != fs::path(options.images_folder).filename();
     const fs::path around = with_model ? images : images.parent_path();
     add_masks(around, options, dataset);

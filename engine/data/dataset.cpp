@@ -1,7 +1,7 @@
 #include "engine/data/dataset.h"
 
-#include <algorithm>
 #include <fmt/format.h>
+#include <algorithm>
 #include <map>
 #include <new>
 #include <numeric>
@@ -25,14 +25,14 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double kStrayPoints = 0.01;  // the share that may lie before the others by mistake
+constexpr double kStrayPoints =
+    0.01;  // share of the points that may lie before the others by mistake
 constexpr size_t kPointsLookedAt = 20'000;
 constexpr double kExtentMargin = 1.1;
-constexpr double kLeastExtent = 1e-9;        // world units: below, cameras stand in one place
-constexpr double kLeastShareOfDepth = 1e-3;  // of the distance to the points: below, likewise
+constexpr double kLeastExtent = 1e-9;  // world units: below this, the cameras stand in one place
+constexpr double kLeastShareOfDepth = 1e-3;  // share of the distance to the points: below this, too
 
-// A list of held-out photos beside a COLMAP model, one name a line, as several loaders of the field
-// read it.
+// Reads a list of held-out photos beside a COLMAP model, one name per line, as several trainers do.
 void mark_test_list(const fs::path& list, Dataset& dataset) {
     if (!fs::is_regular_file(list)) return;
     std::istringstream lines(read_text_file(list));
@@ -59,8 +59,8 @@ Dataset load_model(const fs::path& path, const fs::path& model, const DatasetOpt
     return dataset;
 }
 
-// What the views of a transforms file say that those of a COLMAP model of the same photos do not;
-// empty where they say nothing more.
+// What the views of a transforms file state that those of a COLMAP model of the same photos lack;
+// empty where there is nothing.
 std::string what_it_adds(const Dataset& transforms, const Dataset& model) {
     const auto file = [](const fs::path& path) {
         return path.empty() ? path : fs::absolute(path).lexically_normal();
@@ -92,9 +92,9 @@ std::string what_it_adds(const Dataset& transforms, const Dataset& model) {
                       : "";
 }
 
-// What two sources say of the cameras of the same photos, as far as the frame and the unit of their
-// worlds play no part: focal lengths, turns from one photo to the next, and the ratios of the ways
-// between them. A sentence's part, empty where they agree.
+// How two sources differ on the cameras of the same photos, regardless of the frame and unit of
+// their worlds: compares focal lengths, rotations between successive photos, and ratios of
+// distances between them. Part of a sentence; empty where they agree.
 std::string disagreement(const Dataset& model, const Dataset& transforms) {
     constexpr double kFocal = 0.02, kTurn = 0.02, kWay = 0.05, kMostOdd = 0.1;
     std::map<fs::path, const View*> others;
@@ -143,7 +143,7 @@ void note_transforms_beside(const fs::path& path, const fs::path& model,
     std::string differs;
     try {
         differs = disagreement(dataset, load_transforms(path, options));
-    } catch (const Error&) {  // not to be read, and not asked for
+    } catch (const Error&) {  // it cannot be read, but nobody asked for it
     }
     dataset.notes.push_back(
         differs.empty()
@@ -153,17 +153,18 @@ void note_transforms_beside(const fs::path& path, const fs::path& model,
                           differs, model.string()));
 }
 
-// The model that nerfstudio leaves below its transforms.json, which names the photos as COLMAP saw
-// them. Which of the two it is depends on the photos alone, so that cameras without photos
-// (require_photos false) are those that were trained on.
+// Loads the COLMAP model that nerfstudio leaves beside its transforms.json, which names the photos
+// as COLMAP saw them, or the transforms.json itself. The choice depends on the photos alone, so
+// that loading cameras without photos (require_photos false) gives the cameras that were trained
+// on.
 Dataset load_nerfstudio(const fs::path& path, const fs::path& model, DatasetOptions options) {
     const bool require_photos = std::exchange(options.require_photos, true);
     std::optional<Dataset> transforms;
     try {
         transforms = load_transforms(path, options);
-    } catch (const NoRoom&) {  // which says nothing of the files
+    } catch (const NoRoom&) {  // this says nothing about the files
         throw;
-    } catch (const Error&) {  // then it is the model, or nothing
+    } catch (const Error&) {  // then the model is read, or nothing
     }
     std::string reason;
     try {
@@ -177,7 +178,7 @@ Dataset load_nerfstudio(const fs::path& path, const fs::path& model, DatasetOpti
     }
     if (!transforms) {
         options.require_photos = require_photos;
-        return load_model(path, model, options);  // says what is wrong with it
+        return load_model(path, model, options);  // reports what is wrong with it
     }
     transforms->notes.push_back(
         fmt::format("{} was read in place of {}: {}.", transforms->source, model.string(), reason));
@@ -198,7 +199,7 @@ fs::path project_of_photos(const fs::path& folder) {
 
 namespace {
 
-// options become those of what was read.
+// Sets options to those of the data set that was read.
 Dataset load_source(const fs::path& path, DatasetOptions& options) {
     if (!fs::exists(path)) throw Error(path.string(), "does not exist", "Check the path.");
     if (!fs::is_directory(path)) {
@@ -219,7 +220,7 @@ Dataset load_source(const fs::path& path, DatasetOptions& options) {
     }
     if (transforms) return load_transforms(path, options);
     if (const fs::path opensfm = path / "reconstruction.json"; fs::exists(opensfm))
-        return load_transforms(opensfm, options);  // says what it is
+        return load_transforms(opensfm, options);  // reports what the file is
     if (const fs::path project = project_of_photos(path); !project.empty()) {
         options.images_folder =
             (path == "." ? tidy_path(fs::absolute(path)) : path).filename().string();
@@ -231,7 +232,7 @@ Dataset load_source(const fs::path& path, DatasetOptions& options) {
     refuse_folder(path);
 }
 
-// Image ids of the tracks to indices of the sorted views, each once a point.
+// Turns the image ids in the tracks into indices of the sorted views, each at most once per point.
 void index_tracks(Dataset& dataset) {
     PointCloud& points = dataset.points;
     if (points.seen_by.empty()) {
@@ -245,7 +246,7 @@ void index_tracks(Dataset& dataset) {
     std::vector<std::uint32_t> seen;
     std::vector<float> seen_at;
     std::vector<std::size_t> begin{0};
-    std::vector<std::pair<std::uint32_t, std::size_t>> views;  // with the place in the track
+    std::vector<std::pair<std::uint32_t, std::size_t>> views;  // view, and its place in the track
     for (std::size_t p = 0; p + 1 < points.seen_begin.size(); ++p) {
         views.clear();
         for (std::size_t k = points.seen_begin[p]; k < points.seen_begin[p + 1]; ++k)
@@ -266,7 +267,7 @@ void index_tracks(Dataset& dataset) {
     points.seen_begin = std::move(begin);
 }
 
-// The distance that a share of the points is nearer than; of every step-th point.
+// The distance within which a share of the points lies, judged by every step-th point.
 double distance_quantile(const PointCloud& points, const glm::dvec3& from, double share,
                          size_t step = 1) {
     std::vector<double> distance;
@@ -301,7 +302,7 @@ glm::dvec3 mean_of(const std::vector<glm::dvec3>& centres) {
 Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) try {
     DatasetOptions options = asked;
     options.images_folder = tidy_path(asked.images_folder).generic_string();
-    size_at_resolution(1, 1, options.resolution);  // a bad option fails before any reading
+    size_at_resolution(1, 1, options.resolution);  // rejects a bad option before anything is read
     Dataset dataset = load_source(tidy_path(path), options);
     dataset.options = options;
     std::stable_sort(dataset.views.begin(), dataset.views.end(),
@@ -358,7 +359,7 @@ std::vector<double> nearest_points(const Dataset& dataset) {
     return nearest;
 }
 
-// What is no data set, and the way from it to one.
+// Input that is not a data set, and how to get one from it.
 
 namespace fs = std::filesystem;
 

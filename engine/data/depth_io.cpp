@@ -1,18 +1,18 @@
 #include "engine/data/depth_io.h"
 
+#include <fmt/format.h>
+#include <zlib.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <fmt/format.h>
 #include <map>
 #include <span>
 #include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
-#include <zlib.h>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -73,7 +73,7 @@ DepthRange write_depth_png(const std::filesystem::path& path, const ImageF& dept
     std::string header, file = "\x89PNG\r\n\x1a\n";
     put_u32(header, static_cast<std::uint32_t>(depth.width));
     put_u32(header, static_cast<std::uint32_t>(depth.height));
-    header += std::string("\x10\0\0\0\0", 5);  // 16 bits, grey, the standard methods
+    header += std::string("\x10\0\0\0\0", 5);  // 16 bits, grey, standard methods
     put_chunk(file, "IHDR", header);
     put_chunk(file, "tEXt",
               std::string("DepthUnit") + '\0' + fmt::format("{} world units a step", unit));
@@ -83,8 +83,9 @@ DepthRange write_depth_png(const std::filesystem::path& path, const ImageF& dept
     return range;
 }
 
-// Measured depths as files: 16-bit grey PNG, and .npy or TIFF of float or integer. TIFF is read as
-// TIFF 6.0 and the supplements for its compressions and float predictor define it, also BigTIFF.
+// Reading measured depths: 16-bit grey PNG, and .npy or TIFF with floats or integers. TIFF is read
+// as TIFF 6.0 and the supplements for its compressions and float predictor define it, including
+// BigTIFF.
 
 namespace {
 
@@ -102,7 +103,7 @@ float measured(double value, double unit) {
     return std::isfinite(depth) && depth > 0 ? static_cast<float>(depth) : 0.0f;
 }
 
-/// The text behind 'KEY': of the header's dictionary, up to where `end` is.
+/// The text after 'KEY': in the header's dictionary, up to where `end` stands.
 std::string entry_of(const std::string& header, const std::string& key, char end,
                      const std::string& where) {
     const std::size_t at = header.find("'" + key + "':");
@@ -120,7 +121,7 @@ struct NpyHead {
     std::size_t height = 0, width = 0;
 };
 
-/// [height][width], a last dimension of 1 beside.
+/// Accepts [height][width], and a last dimension of 1.
 NpyHead npy_head(ByteReader& reader, const std::string& where) {
     std::array<char, 6> magic{};
     for (char& c : magic) c = reader.read<char>();
@@ -170,7 +171,7 @@ ImageF read_npy(std::span<const std::byte> file, const Units& units, const std::
     throw Error(where, fmt::format("holds values of the type {}", head.type), kFormats);
 }
 
-/// The fields of a TIFF's first directory, and its bytes by place.
+/// The fields of a TIFF's first directory, with access to the bytes of the file.
 class TiffFile {
   public:
     TiffFile(std::span<const std::byte> bytes, const std::string& where)
@@ -184,7 +185,7 @@ class TiffFile {
             const std::uint64_t entry = first + i * size;
             const std::uint64_t type = number(entry + 2, 2), many = number(entry + 4, value);
             const std::uint64_t width = type == 1 ? 1 : type == 3 ? 2 : type == 4 ? 4 : 8;
-            if (type != 1 && type != 3 && type != 4 && type != 16) continue;  // no plain numbers
+            if (type != 1 && type != 3 && type != 4 && type != 16) continue;  // not plain numbers
             if (many > bytes_.size() / width) refuse("is cut off or damaged");
             const std::uint64_t place =
                 many * width <= value ? entry + 4 + value : number(entry + 4 + value, value);
@@ -225,8 +226,8 @@ class TiffFile {
     std::map<std::uint64_t, std::vector<std::uint64_t>> fields_;
 };
 
-/// TIFF's LZW: codes of 9 to 12 bits, the first bit the highest, one earlier wider than need be.
-/// Fewer than `size` bytes where the codes are cut off or damaged.
+/// Decodes TIFF's LZW: codes of 9 to 12 bits, highest bit first, which grow wider one code earlier
+/// than necessary. Returns fewer than `size` bytes where the codes are cut off or damaged.
 std::vector<std::byte> unlzw(std::span<const std::byte> codes, std::size_t size) {
     constexpr unsigned kClear = 256, kEnd = 257, kMost = 4096, kNone = kMost;
     std::vector<std::uint16_t> before(kMost), length(kMost, 1);
@@ -285,7 +286,7 @@ std::vector<std::byte> unpack_bits(std::span<const std::byte> runs, std::size_t 
     return out;
 }
 
-/// How the samples of a TIFF lie in its strips or tiles, which are tiles as wide as the picture.
+/// How the samples of a TIFF are laid out in tiles; strips count as tiles as wide as the picture.
 struct TiffLayout {
     std::size_t width = 0, height = 0, tile_width = 0, tile_height = 0, bytes = 0;
     bool floats = false, is_signed = false;
@@ -310,7 +311,7 @@ TiffLayout tiff_layout(const TiffFile& tiff, std::size_t file_bytes, const std::
     if (in.predictor < 1 || in.predictor > 3 || (in.predictor == 3 && !in.floats))
         tiff.refuse(fmt::format("is a TIFF of predictor {}", in.predictor));
     constexpr std::uint64_t kMostPacked =
-        4096;  // bytes that a byte of LZW or deflate can stand for
+        4096;  // bytes that one byte of LZW or deflate can expand to
     if (in.width > INT32_MAX || in.height > INT32_MAX) in.width = 0;
     check_photo_claim(static_cast<std::int64_t>(in.width), static_cast<std::int64_t>(in.height),
                       in.width * in.height * in.bytes / kMostPacked, file_bytes, where);
@@ -324,7 +325,7 @@ TiffLayout tiff_layout(const TiffFile& tiff, std::size_t file_bytes, const std::
     return in;
 }
 
-/// Of a strip or tile, `rows` high, the samples in this machine's order of bytes.
+/// The samples of a strip or tile `rows` high, in native byte order.
 std::vector<std::byte> tiff_samples(const TiffFile& tiff, const TiffLayout& in,
                                     std::span<const std::byte> packed, std::size_t rows) {
     const std::size_t row = in.tile_width * in.bytes, size = rows * row;
@@ -352,7 +353,7 @@ std::vector<std::byte> tiff_samples(const TiffFile& tiff, const TiffLayout& in,
     std::vector<std::byte> line(row);
     for (std::size_t y = 0; y < rows; ++y) {
         std::byte* const begin = raw.data() + y * row;
-        if (in.predictor == 3) {  // differences of bytes, the highest of all samples first
+        if (in.predictor == 3) {  // differences of bytes, the highest bytes of all samples first
             for (std::size_t i = 1; i < row; ++i)
                 begin[i] = static_cast<std::byte>(std::to_integer<unsigned>(begin[i]) +
                                                   std::to_integer<unsigned>(begin[i - 1]));

@@ -1,4 +1,4 @@
-// Depth images as files: 16-bit grey PNG, and to read .npy and TIFF as well.
+// Depth images: written as 16-bit grey PNG; read from PNG, .npy and TIFF.
 #pragma once
 
 #include <cstddef>
@@ -16,16 +16,16 @@ struct DepthRange {
 };
 
 /// depth: first channel, world units, 0 where nothing is seen. One grey step is `unit` world units;
-/// rounded, and kDepthSteps from there on. A tEXt chunk "DepthUnit" states the unit.
+/// values are rounded, and limited to kDepthSteps. A tEXt chunk "DepthUnit" states the unit.
 DepthRange write_depth_png(const std::filesystem::path& path, const ImageF& depth, double unit);
 
 constexpr double kMillimetre = 0.001;  // m
 
-/// Measured depths [H][W], metres along the optical axis; 0 where nothing was measured, as where
-/// the file has 0, NaN, infinity or less than 0. unit: metres a step; 0: what the type says, 0.001
-/// of integers, which are 16-bit grey PNG and some .npy and TIFF, 1 of .npy and TIFF of floats.
-/// of_integers: the unit is that of integers, and floats are metres in any case. Throws Error
-/// naming the file where it is of another type, or has no measured depth.
+/// Reads measured depths [H][W], metres along the optical axis; 0 where nothing was measured, which
+/// includes NaN, infinite and negative values in the file. unit: metres a step; 0: as the type
+/// says, 0.001 for integers (16-bit grey PNG, some .npy and TIFF) and 1 for floats (.npy and TIFF).
+/// of_integers: `unit` applies to integers only, and floats are metres in any case. Throws Error
+/// naming the file where it has another type, or holds no measured depth.
 ImageF read_depth(const std::filesystem::path& path, double unit = 0, bool of_integers = false);
 
 }  // namespace darb

@@ -24,12 +24,14 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr float kOneSurface = 0.05f;        // neighbours within it are of one surface
-constexpr std::size_t kViewsForScale = 20;  // that are read
+constexpr float kOneSurface =
+    0.05f;  // neighbours that differ by less, as a share, lie on one surface
+constexpr std::size_t kViewsForScale = 20;  // views whose depths are read to find the scale
 constexpr std::size_t kLeastPoints = 20;
-constexpr double kOfTheSameScene = 0.2;  // most spread of points over depths, as a share
+constexpr double kOfTheSameScene =
+    0.2;  // largest spread of the ratios of points to depths, as a share
 
-/// A name's stems: with and without its extension, with and without images/.
+/// The stems of a name: with and without its extension, with and without images/.
 std::vector<fs::path> depth_stems(const std::string& name) {
     const fs::path plain = without_images(name);
     return {plain, without_picture_extension(plain), fs::path(name),
@@ -57,7 +59,7 @@ fs::path find_depth(const fs::path& depths, const std::string& name) {
     return {};
 }
 
-/// FOLDER/depths or FOLDER/depth, in whatever case; empty where there is neither.
+/// FOLDER/depths or FOLDER/depth, ignoring case; empty where there is neither.
 fs::path depths_folder(const fs::path& folder) {
     for (const char* name : {"depths", "depth"})
         if (fs::is_directory(folder / name)) return folder / name;
@@ -68,7 +70,7 @@ fs::path depths_folder(const fs::path& folder) {
     return {};
 }
 
-/// NAME_depth.png and the like beside the photos. Returns how many.
+/// Takes NAME_depth.png and the like beside the photos. Returns how many it found.
 std::size_t find_depths_beside_photos(Dataset& dataset) {
     std::size_t found = 0;
     for (View& view : dataset.views) {
@@ -81,7 +83,7 @@ std::size_t find_depths_beside_photos(Dataset& dataset) {
     return found;
 }
 
-/// Files of photos' names that are of a kind that is not read.
+/// Notes files that have the names of photos but a kind that cannot be read.
 void note_unread_depths(const fs::path& depths, Dataset& dataset) {
     std::set<std::string> wanted;
     for (const View& view : dataset.views)
@@ -102,7 +104,8 @@ void note_unread_depths(const fs::path& depths, Dataset& dataset) {
             counted(count, "file"), depths.string(), first.filename().string()));
 }
 
-/// COLMAP may have left photos out, which leaves their depths without a view.
+/// Checks that depths belong to photos; COLMAP may have left photos out, whose depths then have no
+/// view.
 void check_depths(const fs::path& depths, const fs::path& images, const Dataset& dataset) {
     std::set<fs::path> known;
     for (const View& view : dataset.views)
@@ -124,7 +127,7 @@ void check_depths(const fs::path& depths, const fs::path& images, const Dataset&
     }
 }
 
-/// With the photo: EXIF's turns are those of bytes.
+/// Turns a depth image as its photo is turned, by the EXIF rotation of an image with as many bytes.
 ImageF turned(ImageF depth, const View& view) {
     ImageU8 bytes(depth.width, depth.height, 4);
     std::memcpy(bytes.data.data(), depth.data.data(), bytes.data.size());
@@ -134,13 +137,13 @@ ImageF turned(ImageF depth, const View& view) {
     return result;
 }
 
-/// The measured neighbours of a place in the file, px.
+/// Interpolates between the measured neighbours of a place in the file, px.
 class Depths {
   public:
     explicit Depths(ImageF image) : image_(std::move(image)) {}
     const ImageF& image() const { return image_; }
 
-    /// reach: of the pixel that asks, to each side.
+    /// reach: half the size of the requesting pixel in px of the file, along each axis.
     float at(glm::dvec2 place, glm::dvec2 reach) const {
         const double x = std::clamp(place.x - 0.5, 0.0, image_.width - 1.0);
         const double y = std::clamp(place.y - 0.5, 0.0, image_.height - 1.0);
@@ -176,7 +179,7 @@ class Depths {
     ImageF image_;
 };
 
-/// Depth of a point seen by a view over the depth that was measured there.
+/// Ratios of the depths of points that a view sees to the depths measured there.
 std::vector<double> ratios_of(const Dataset& dataset, std::size_t v) {
     const View& view = dataset.views[v];
     const ImageF depth = load_depth(view);
@@ -248,7 +251,7 @@ ImageF load_depth(const View& view) {
     for (int y = 0; y < camera.height; ++y)
         for (int x = 0; x < camera.width; ++x) {
             const glm::dvec2 pixel(x + 0.5, y + 0.5);
-            glm::dvec2 place = pixel / own * photo;  // px of the photo
+            glm::dvec2 place = pixel / own * photo;  // px in the photo
             if (straightens) {
                 const glm::dvec2 ray((pixel.x - camera.cx) / camera.fx,
                                      (pixel.y - camera.cy) / camera.fy);

@@ -1,5 +1,5 @@
-// Depths that were measured beside the photos (LiDAR, depth cameras): where they lie, and as the
-// cameras of the views see them.
+// Depths that were measured along with the photos (by LiDAR or depth cameras): finding the files,
+// and mapping them to the cameras of the views.
 #pragma once
 
 #include <filesystem>
@@ -9,26 +9,28 @@
 
 namespace darb {
 
-/// Gives every view its depth in FOLDER/depths or, where that is not there, FOLDER/depth, in
-/// whatever case: the photo's name, a leading "images/" left out or not, with .png, .tif, .tiff or
-/// .npy in place of its extension or added to it, after "_depth" or not. Without such a folder,
-/// those of NAME_depth beside the photos. Photos may have none. Files of another kind, and folders
-/// that may have been meant, are noted. images: the folder of the photos. Throws Error where a file
-/// there is of no photo. Where FOLDER/sparse/0/depth_params.json lies they are inverse depths of a
-/// network, which 3DGS takes: a note says that they are left out.
+/// Gives every view its depth file from FOLDER/depths or, where that does not exist, FOLDER/depth,
+/// ignoring case. The file has the photo's name, with or without a leading "images/", with .png,
+/// .tif, .tiff or .npy in place of its extension or added to it, and possibly "_depth" before that.
+/// Without such a folder, NAME_depth beside the photos is taken. Photos may lack a depth. Notes
+/// name files of other kinds, and folders that may have been meant. images: the folder of the
+/// photos. Throws Error where a file belongs to no photo. Where FOLDER/sparse/0/depth_params.json
+/// exists, the files are inverse depths predicted by a network, as 3DGS takes them: they are left
+/// out, with a note.
 void add_depths(const std::filesystem::path& folder, const std::filesystem::path& images,
                 const DatasetOptions& options, Dataset& dataset);
 
-/// The depth of a view, [H][W] of its camera, metres along the optical axis, 0 where nothing was
-/// measured; the file may have any size of the photo's shape. Straightened with the photo. Between
-/// four measured neighbours that are within 5 % bilinear, elsewhere the measured one that is
-/// nearest within the pixel. Throws Error naming the file.
+/// The depth of a view, [H][W] at its camera's size, metres along the optical axis, 0 where nothing
+/// was measured. The file may have any size with the photo's aspect. It is undistorted like the
+/// photo. Between four measured neighbours within 5 % of each other it is interpolated bilinearly;
+/// elsewhere the nearest measured value within a pixel is taken. Throws Error naming the file.
 ImageF load_depth(const View& view);
 
-/// World units a metre: DatasetOptions::depth_scale; else, where tracks say which photos see which
-/// points, the median of the points' depths over the measured ones, with a note; else what the
-/// reader of the source set, 1 but for transforms files with an applied_scale. Throws Error where
-/// fewer than 20 points were measured. Views must be fitted (fit_views).
+/// Sets dataset.depth_scale, world units a metre: DatasetOptions::depth_scale if given; otherwise,
+/// where tracks say which photos see which points, the median ratio of the points' depths to the
+/// measured ones, with a note; otherwise it stays as the reader of the source set it (1, except for
+/// transforms files with an applied_scale). Throws Error where fewer than 20 points have a measured
+/// depth. Views must be fitted first (fit_views).
 void find_depth_scale(Dataset& dataset);
 
 }  // namespace darb

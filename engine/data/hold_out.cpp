@@ -22,10 +22,13 @@ namespace {
 
 constexpr int kUsual = 8;
 constexpr int kMost = 100'000;
-// Pulls the point that cameras look at to their mean, where their axes are parallel.
+// Where the axes of cameras are parallel, this weight pulls the point that they look at to their
+// mean.
 constexpr double kPull = 1e-3;
-constexpr double kLeastUp = 1e-3;   // mean of the cameras' up vectors: below, they have none
-constexpr double kOnePlace = 1e-9;  // of the distance to the origin, at least 1: no distance
+constexpr double kLeastUp =
+    1e-3;  // length of the mean of the cameras' up vectors: below this, they have none in common
+constexpr double kOnePlace =
+    1e-9;  // share of the distance to the origin (at least 1): closer cameras stand in one place
 constexpr double kTurn = 6.283185307179586;
 
 glm::dvec3 row(const glm::dmat3& m, int r) {
@@ -38,7 +41,7 @@ glm::dvec3 row(const glm::dmat3& m, int r) {
                 "Use every:8, arc:8, or both: every:8,arc:8.");
 }
 
-/// The point nearest to all axes of sight.
+/// The point nearest to all viewing axes.
 glm::dvec3 looked_at(const std::vector<View>& views, const glm::dvec3& mean) {
     glm::dmat3 sum(kPull * double(views.size()));
     glm::dvec3 right = sum * mean;
@@ -51,9 +54,10 @@ glm::dvec3 looked_at(const std::vector<View>& views, const glm::dvec3& mean) {
     return glm::inverse(sum) * right;
 }
 
-struct Ring {  // what angles are measured in
+struct Ring {  // the frame in which angles are measured
     glm::dvec3 centre, right, ahead;
-    bool one_place = false;  // of the cameras: their directions of sight tell them apart
+    bool one_place =
+        false;  // the cameras stand in one place, and their viewing directions tell them apart
     double angle(const Camera& camera) const {
         const glm::dvec3 at = one_place ? row(camera.rotation, 2) : camera.centre() - centre;
         return std::atan2(glm::dot(at, ahead), glm::dot(at, right));
@@ -72,7 +76,7 @@ Ring ring_of(const std::vector<View>& views) {
     Ring ring;
     ring.one_place = widest < kOnePlace * std::max(1.0, glm::length(mean));
     ring.centre = ring.one_place ? mean : looked_at(views, mean);
-    // Rolled to all sides: any axis does.
+    // With cameras rolled to all sides, any axis will do.
     up = glm::length(up) > kLeastUp ? glm::normalize(up) : glm::dvec3(0, 0, 1);
     const glm::dvec3 other = std::abs(up.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     ring.right = glm::normalize(glm::cross(up, other));
@@ -133,7 +137,7 @@ std::vector<std::size_t> way_round(const std::vector<View>& views) {
 
 namespace {
 
-/// FNV-1a of at most so many bytes of a file; 0 where it cannot be read.
+/// FNV-1a of the first `most` bytes of a file; 0 where it cannot be read.
 std::uint64_t hash_of_file(const std::filesystem::path& path, std::uint64_t most) {
     std::ifstream file(path, std::ios::binary);
     std::uint64_t hash = 0xcbf29ce484222325ULL;
@@ -147,7 +151,7 @@ std::uint64_t hash_of_file(const std::filesystem::path& path, std::uint64_t most
     return file.bad() ? 0 : hash;
 }
 
-// Groups that have more than one member, split by a key of their members.
+// Splits groups by a key of their members, and keeps those with more than one member.
 template <typename Key>
 std::vector<std::vector<std::size_t>> split(const std::vector<std::vector<std::size_t>>& groups,
                                             const Key& key_of) {
@@ -161,7 +165,7 @@ std::vector<std::vector<std::size_t>> split(const std::vector<std::vector<std::s
     return parts;
 }
 
-// Names of the first photos that several views have, for people.
+// Names of the first of several views with one photo, for messages.
 std::string some_names(const std::vector<View>& views, const std::vector<std::size_t>& first) {
     constexpr int kNamed = 3;
     std::string list;
@@ -175,10 +179,11 @@ std::string some_names(const std::vector<View>& views, const std::vector<std::si
     return list;
 }
 
-/// Brings the views of a photo to the side of the test where one of them is there.
+/// Makes all views of a photo test views where one of them is.
 std::string keep_together(std::vector<View>& views, const std::vector<std::size_t>& first) {
     std::vector<View> moved = views;
-    for (const bool spread : {false, true})  // first to the first view of a photo, then from it
+    for (const bool spread :
+         {false, true})  // first from all views to the first of each photo, then from that to all
         for (std::size_t i = 0; i < moved.size(); ++i) {
             View& to = moved[spread ? i : first[i]];
             const View& from = moved[spread ? first[i] : i];
@@ -206,7 +211,7 @@ std::string keep_together(std::vector<View>& views, const std::vector<std::size_
 }  // namespace
 
 std::vector<std::size_t> first_of_photo(const std::vector<View>& views) {
-    constexpr std::uint64_t kHead = 1 << 16;  // bytes that tell nearly all files apart
+    constexpr std::uint64_t kHead = 1 << 16;  // this many bytes tell nearly all files apart
     std::vector<std::size_t> first(views.size());
     std::iota(first.begin(), first.end(), std::size_t{0});
     std::map<std::pair<dev_t, ino_t>, std::size_t> files;
@@ -227,7 +232,7 @@ std::vector<std::size_t> first_of_photo(const std::vector<View>& views) {
         groups = split(groups, [&](std::size_t i) { return hash_of_file(views[i].photo, most); });
     for (const std::vector<std::size_t>& group : groups)
         for (const std::size_t i : group) first[i] = group.front();
-    for (std::size_t& i : first) i = first[i];  // another name of a copy
+    for (std::size_t& i : first) i = first[i];  // follow links to another name of a copy
     return first;
 }
 

@@ -1,15 +1,15 @@
 #include "engine/data/image_io.h"
 
+#include <fmt/format.h>
+#include <png.h>
+#include <stb/stb_image_write.h>
 #include <algorithm>
 #include <array>
 #include <csetjmp>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
-#include <fmt/format.h>
 #include <optional>
-#include <png.h>
-#include <stb/stb_image_write.h>
 #include <string_view>
 #include <vector>
 
@@ -22,7 +22,7 @@ namespace darb {
 namespace {
 
 constexpr std::size_t kHeadBytes = std::size_t{1}
-                                   << 18;  // EXIF and ICC come before the frame header
+                                   << 18;  // EXIF and ICC data come before the frame header
 
 constexpr std::string_view kPhotoExtensions[] = {".png", ".jpg", ".jpeg"};
 constexpr std::string_view kForeignExtensions[] = {".webp", ".tif",  ".tiff",
@@ -53,7 +53,7 @@ void check_picture(const ImageU8& image) {
             "Give it a width, a height and channels.");
 }
 
-/// What stb_image_write calls with each piece of a file.
+/// Called by stb_image_write with each piece of a file.
 void append_bytes(void* context, void* data, int size) {
     auto* out = static_cast<std::vector<std::byte>*>(context);
     const auto* bytes = static_cast<const std::byte*>(data);
@@ -128,7 +128,7 @@ ImageU8 orient_image(const ImageU8& image, int orientation) {
     const auto channels = static_cast<std::size_t>(image.channels);
     for (int y = 0; y < turned.height; ++y)
         for (int x = 0; x < turned.width; ++x) {
-            // Stored pixel (u, v) that is seen at (x, y).
+            // The stored pixel (u, v) that appears at (x, y).
             int u = swap ? y : x, v = swap ? x : y;
             if (orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8)
                 u = w - 1 - u;
@@ -175,37 +175,30 @@ std::string picture_name(const std::string& view_name, std::set<std::string>& us
 
 }  // namespace darb
 
-// JPEG by libjpeg-turbo, with its accurate settings. What its warnings call corrupt data is an
-// error here: the pixels behind it would be made up.
+// JPEG by libjpeg-turbo, with its accurate settings. Where its warnings speak of corrupt data, that
+// is an error here: the pixels after it would be made up.
 
-// After cstdio, which it needs.
+// Must follow cstdio.
 #include <jpeglib.h>
-// After jpeglib.h.
+// Must follow jpeglib.h.
 #include <jerror.h>
-
-#include <algorithm>
-#include <array>
-#include <vector>
-
-#include "engine/core/error.h"
-#include "engine/data/photo_decoder.h"
 
 namespace darb {
 
 namespace {
 
-// Progressive files have about ten scans; each costs a walk over the whole photo, however few its
-// bytes.
+// Progressive files have about ten scans. Each costs a pass over the whole photo, however few bytes
+// it has.
 constexpr int kMostScans = 100;
 
-/// libjpeg's state, and what ended it. Nothing that longjmp leaves has a destructor.
+/// libjpeg's state, and the reason where it failed. Nothing that longjmp skips has a destructor.
 struct JpegReader {
     jpeg_decompress_struct state{};
     jpeg_error_mgr errors{};
     jpeg_progress_mgr progress{};
     std::jmp_buf failed{};
     std::array<char, JMSG_LENGTH_MAX> reason{};
-    bool in_data = false;  // the head is read
+    bool in_data = false;  // the head has been read
 
     explicit JpegReader(std::span<const std::byte> file);
     ~JpegReader() { jpeg_destroy_decompress(&state); }
@@ -224,8 +217,8 @@ JpegReader& reader_of(j_common_ptr state) {
 }
 
 bool is_harmless(int warning) {
-    // Bytes between segments, versions and marks of applications, and the numbers in a scan's head
-    // that mean nothing in a sequential file.
+    // Harmless: bytes between segments, versions and marks of applications, and numbers in a scan's
+    // head that mean nothing in a sequential file.
     return warning == JWRN_EXTRANEOUS_DATA || warning == JWRN_ADOBE_XFORM ||
            warning == JWRN_JFIF_MAJOR || warning == JWRN_NOT_SEQUENTIAL ||
            warning == JWRN_BOGUS_ICC;
@@ -234,7 +227,7 @@ bool is_harmless(int warning) {
 void take_message(j_common_ptr state, int level) {
     if (level >= 0 || is_harmless(state->err->msg_code)) return;
     JpegReader& reader = reader_of(state);
-    // Where all pixels are there before it, a missing end mark is harmless as well.
+    // Where all pixels come before it, a missing end marker is harmless as well.
     if (state->err->msg_code == JWRN_JPEG_EOF && reader.in_data &&
         !jpeg_has_multiple_scans(&reader.state))
         return;
@@ -255,14 +248,15 @@ JpegReader::JpegReader(std::span<const std::byte> file) {
     errors.emit_message = take_message;
     state.client_data = this;
     progress.progress_monitor = limit_scans;
-    if (setjmp(failed) != 0) return;  // out of memory; the next call fails as well
+    if (setjmp(failed) != 0) return;  // out of memory; the next call will fail, too
     jpeg_create_decompress(&state);
     state.progress = &progress;
     jpeg_mem_src(&state, reinterpret_cast<const unsigned char*>(file.data()),
                  static_cast<unsigned long>(file.size()));
 }
 
-/// Runs `work`; false where libjpeg ends it. Its locals are plain: longjmp runs no destructor.
+/// Runs `work`; returns false where libjpeg fails. Its locals must be plain: longjmp runs no
+/// destructors.
 template <class Work>
 bool run_jpeg(JpegReader& reader, const Work& work) {
     if (setjmp(reader.failed) != 0) return false;
@@ -289,7 +283,7 @@ int channels_of(const JpegReader& reader, const std::string& where) {
     return 3;
 }
 
-/// A block of 8 x 8 px needs a bit of a file at least, its brightness'.
+/// A block of 8 x 8 px takes at least one bit of the file, for its brightness.
 std::uint64_t least_jpeg_bytes(std::uint64_t width, std::uint64_t height) {
     return (width + 7) / 8 * ((height + 7) / 8) / 8;
 }
@@ -321,12 +315,12 @@ PhotoHead checked_head(const JpegReader& reader, std::uint64_t bytes, const std:
                 kReplacePhoto);
 }
 
-std::uint8_t product(unsigned a, unsigned b) {  // of parts of 255, rounded
+std::uint8_t product(unsigned a, unsigned b) {  // product of two shares of 255, rounded
     const unsigned t = a * b + 128;
     return static_cast<std::uint8_t>((t + (t >> 8)) >> 8);
 }
 
-/// Adobe's programs store inks as what they leave of white.
+/// Adobe's programs store inks inverted: as what they leave of white.
 void inks_to_rgb(const std::uint8_t* inks, std::uint8_t* rgb, std::size_t count, bool inverted) {
     for (std::size_t i = 0; i < count; ++i, inks += 4, rgb += 3)
         for (std::size_t c = 0; c < 3; ++c)
@@ -357,7 +351,7 @@ ImageU8 decode_jpeg(std::span<const std::byte> file, const std::string& where) {
     s.out_color_space = inks ? JCS_CMYK : head.channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
     s.dct_method = JDCT_ISLOW;
     s.do_fancy_upsampling = TRUE;
-    s.do_block_smoothing = FALSE;  // which makes up what a progressive file leaves out
+    s.do_block_smoothing = FALSE;  // smoothing would make up what a progressive file leaves out
     reader.in_data = true;
     ImageU8 image(head.width, head.height, head.channels);
     std::vector<std::uint8_t> ink_row(inks ? std::size_t{4} * head.width : 0);
@@ -376,8 +370,8 @@ ImageU8 decode_jpeg(std::span<const std::byte> file, const std::string& where) {
     return image;
 }
 
-// PNG by libpng. Pixels are taken as they are stored: no gamma, no colour profile. Every chunk's
-// checksum counts.
+// PNG by libpng. Pixels are taken as stored, without gamma or colour profiles. The checksum of
+// every chunk must be right.
 
 namespace {
 
@@ -386,8 +380,8 @@ struct PngReader {
     png_infop info = nullptr;
     std::span<const std::byte> file;
     std::size_t at = 0;
-    std::uint32_t row = 0;  // that is read
-    bool cut = false;       // the bytes ended
+    std::uint32_t row = 0;  // the row being read
+    bool cut = false;       // the bytes ended too early
     std::array<char, 200> reason{};
 
     explicit PngReader(std::span<const std::byte> file_);
@@ -402,7 +396,7 @@ struct PngReader {
     png_longjmp(png, 1);
 }
 
-/// Of what libpng would go on with, that is an error which changes pixels.
+/// Treats those of libpng's warnings as errors that mean changed pixels.
 void take_warning(png_structp png, png_const_charp message) {
     const std::string_view text(message);
     const bool pixels = text.starts_with("IDAT") || text.starts_with("tRNS");
@@ -419,7 +413,8 @@ void read_png_bytes(png_structp png, png_bytep to, std::size_t count) {
     reader.at += count;
 }
 
-/// Runs `work`; false where libpng ends it. Its locals are plain: longjmp runs no destructor.
+/// Runs `work`; returns false where libpng fails. Its locals must be plain: longjmp runs no
+/// destructors.
 template <class Work>
 bool run_png(PngReader& reader, const Work& work) {
     if (!reader.png || !reader.info) {
@@ -438,7 +433,7 @@ PngReader::PngReader(std::span<const std::byte> file_) : file(file_) {
     png_set_read_fn(png, this, read_png_bytes);
     run_png(*this, [this] {
         png_set_user_limits(png, kMostPhotoSide, kMostPhotoSide);
-        // Chunks that say nothing about the pixels are checked and passed over, never unpacked.
+        // Chunks that say nothing about the pixels are checked and skipped, never unpacked.
         png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
         png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
     });
@@ -455,7 +450,7 @@ bool read_head(PngReader& reader) {
     return run_png(reader, [&] { png_read_info(reader.png, reader.info); });
 }
 
-/// Deflate packs at most 1,032 bytes in one; a row begins with its filter's byte.
+/// Deflate packs at most 1,032 bytes into one; each row begins with a byte for its filter.
 std::uint64_t least_png_bytes(std::uint64_t height, std::uint64_t row_bytes) {
     return (row_bytes + 1) * height / 1032;
 }
@@ -510,7 +505,7 @@ ImageU8 decode_png(std::span<const std::byte> file, const std::string& where) {
     const PhotoHead head = checked_head(reader, file.size(), where);
     const int channels = head.channels == 2 ? 4 : head.channels;
     const auto prepare = [&] {
-        png_set_expand(reader.png);  // palettes, 1 to 4 bits, a transparent colour
+        png_set_expand(reader.png);  // expands palettes, 1 to 4 bits, and a transparent colour
         png_set_strip_16(reader.png);
         if (head.channels == 2) png_set_gray_to_rgb(reader.png);
         png_set_interlace_handling(reader.png);
@@ -560,11 +555,11 @@ std::uint32_t read_uint(Bytes bytes, std::size_t at, std::size_t size, bool litt
 
 struct Entry {
     std::uint32_t type = 0, count = 0;
-    std::size_t value = 0;  // where it stands, or where the place of a longer one stands
+    std::size_t value = 0;  // offset of the value, or of the offset of a longer one
 };
 
-/// tiff: from the byte order mark on. A directory is a count and 12-byte entries: tag, type, count,
-/// value. Nothing where it has no such tag.
+/// tiff: begins with the byte order mark. A directory is a count followed by 12-byte entries: tag,
+/// type, count, value. Returns nothing where the tag is missing.
 std::optional<Entry> find_entry(Bytes tiff, std::size_t directory, std::uint32_t tag, bool little) {
     constexpr std::uint32_t kEntryBytes = 12;
     if (directory > tiff.size() || tiff.size() - directory < 2) return {};
@@ -579,7 +574,7 @@ std::optional<Entry> find_entry(Bytes tiff, std::size_t directory, std::uint32_t
     return {};
 }
 
-/// Whether it is one, and its byte order.
+/// Whether this is TIFF data; also sets its byte order.
 bool is_tiff(Bytes tiff, bool& little) {
     if (tiff.size() < 8) return false;
     little = tiff[0] == std::byte{'I'};
@@ -630,7 +625,7 @@ std::string tiff_time(Bytes tiff) {
     return text;
 }
 
-/// What follows "Exif" in the file; nothing where there is none.
+/// What follows "Exif" in the file; empty where there is none.
 Bytes exif_of(Bytes file) {
     constexpr std::uint32_t kStartOfImage = 0xd8, kStartOfScan = 0xda, kApp1 = 0xe1;
     if (file.size() < 4 || read_uint(file, 0, 2, false) != (0xff00u | kStartOfImage)) return {};

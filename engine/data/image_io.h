@@ -50,8 +50,9 @@ std::vector<std::byte> encode_jpeg(const ImageU8& image, int quality);
 /// encode_png through write_file_atomic, so makes missing folders.
 void write_png(const std::filesystem::path& path, const ImageU8& image);
 
-/// File name for a picture of a view: the view's name without the extension of a picture, folders
-/// joined by "_", then "_2", "_3" where `used` has the name, then ".png". Adds it to `used`.
+/// A file name for a picture of a view: the view's name without its picture extension, with folders
+/// joined by "_", then "_2", "_3" and so on where `used` already has the name, then ".png". Adds it
+/// to `used`.
 std::string picture_name(const std::string& view_name, std::set<std::string>& used);
 
 // The EXIF tags that matter here: how a stored photo is to be turned, its focal

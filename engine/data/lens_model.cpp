@@ -1,8 +1,8 @@
 #include "engine/data/lens_model.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <optional>
 
 #include "engine/core/error.h"
@@ -16,11 +16,11 @@ constexpr std::string_view kPanorama = "EQUIRECTANGULAR";
 
 struct ModelRow {
     std::string_view name;
-    int parameters;  // 0: the model is not read
+    int parameters;  // 0: the model cannot be read
     bool one_focal;  // f, cx, cy rather than fx, fy, cx, cy
 };
 
-// By COLMAP's id.
+// Indexed by COLMAP's model id.
 constexpr ModelRow kModels[] = {
     {"SIMPLE_PINHOLE", 3, true},
     {"PINHOLE", 4, false},
@@ -40,12 +40,12 @@ constexpr ModelRow kModels[] = {
     {"FISHEYE", 4, false},
     {"EUCM", 0, false},
     {kPanorama, 0, false},
-    {kFourRadial, 10, false},  // no id of COLMAP's
+    {kFourRadial, 10, false},  // has no COLMAP id
 };
 
 constexpr double kHalfPi = 1.5707963267948966;
 constexpr int kMaxSize = 100000;      // px
-constexpr double kSmallOmega = 1e-6;  // FOV is a pinhole below it
+constexpr double kSmallOmega = 1e-6;  // below this, FOV is a pinhole
 
 const ModelRow* find_model(std::string_view name) {
     for (const ModelRow& row : kModels)
@@ -134,7 +134,7 @@ LensModel scale_lens(const LensModel& lens, int width, int height) {
     LensModel scaled = lens;
     scaled.width = width;
     scaled.height = height;
-    if (row.one_focal) {  // one focal length: sx and sy differ by rounding of the size at most
+    if (row.one_focal) {  // sx and sy differ only by the rounding of the size
         scaled.parameters[0] *= 0.5 * (sx + sy);
         scaled.parameters[1] *= sx;
         scaled.parameters[2] *= sy;
@@ -245,7 +245,7 @@ glm::dvec2 Lens::project(glm::dvec2 ray) const {
 }
 
 LensTerms Lens::terms(glm::dvec2 size) const {
-    constexpr int kBorderSamples = 64;    // a side
+    constexpr int kBorderSamples = 64;    // per side
     constexpr double kMaxTangent = 10.0;  // 84 degrees
     LensTerms terms;
     terms.active = true;
@@ -318,8 +318,9 @@ std::optional<glm::dvec2> Lens::unproject(glm::dvec2 pixel) const {
 namespace {
 
 constexpr double kMaxTangent = 1.7320508075688772;  // 60 degrees to each side
-constexpr int kBorderSamples = 128;                 // a side
-constexpr double kMaxGrowth = 2.0;                  // of the size, against extreme magnification
+constexpr int kBorderSamples = 128;                 // per side
+constexpr double kMaxGrowth =
+    2.0;  // limit on the size, as a multiple, against extreme magnification
 
 /// Bounds of the frame on the plane z = 1.
 struct Bounds {
@@ -348,7 +349,7 @@ glm::dvec2 ray_of(const Camera& camera, double x, double y) {
     return {(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy};
 }
 
-/// Half a pixel of tolerance: the outermost photo pixels repeat outwards.
+/// Allows half a pixel of tolerance, because the outermost pixels of the photo repeat outwards.
 bool inside(const LensModel& model, glm::dvec2 pixel) {
     return pixel.x >= 0 && pixel.y >= 0 && pixel.x <= model.width && pixel.y <= model.height;
 }
@@ -368,11 +369,11 @@ bool has_gaps(const Lens& lens, const LensModel& model, const Camera& camera) {
 }
 
 struct Sample {
-    float rgb[3] = {0, 0, 0};  // times alpha
+    float rgb[3] = {0, 0, 0};  // premultiplied by alpha
     float alpha = 0;           // 0 to 255
 };
 
-/// Bilinear; the outermost pixels repeat outwards.
+/// Samples bilinearly; the outermost pixels repeat outwards.
 Sample sample(const ImageU8& rgba, glm::dvec2 pixel) {
     const double x = std::clamp(pixel.x - 0.5, 0.0, rgba.width - 1.0);
     const double y = std::clamp(pixel.y - 0.5, 0.0, rgba.height - 1.0);

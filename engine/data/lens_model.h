@@ -17,41 +17,43 @@
 
 namespace darb {
 
-/// nerfstudio's perspective camera, none of COLMAP's: fx fy cx cy k1 k2 p1 p2 k3 k4, of which all
-/// of k stand in the numerator.
+/// nerfstudio's perspective camera, which COLMAP lacks: fx fy cx cy k1 k2 p1 p2 k3 k4, with all k
+/// in the numerator.
 constexpr std::string_view kFourRadial = "FOUR_RADIAL";
-/// COLMAP's name of a model id, 0 to 17; empty for other ids. check_lens knows which are read.
+/// COLMAP's name for a model id, 0 to 17; empty for other ids. check_lens knows which can be read.
 std::string_view lens_model_name(int id);
-/// -1 for an unknown name, 0 for a model that is not read.
+/// The number of parameters; -1 for an unknown name, 0 for a model that cannot be read.
 int lens_parameter_count(std::string_view model);
 
-/// Throws Error where the model is unknown or not read, the parameter count is wrong, a parameter
-/// is not finite, a focal length is not positive, or the size is not between 1 and 100,000 px.
+/// Throws Error where the model is unknown or cannot be read, the parameter count is wrong, a
+/// parameter is not finite, a focal length is not positive, or the size is not between 1 and
+/// 100,000 px.
 void check_lens(const LensModel& lens, const std::string& where);
 
-/// A fisheye (or FOV) whose photo reaches more than 60 degrees to some side, where a flat picture
-/// ends (see load_photo): undistorted it would lose its borders.
+/// Whether the lens is a fisheye (or FOV) whose photo reaches more than 60 degrees to some side.
+/// Flat pictures end there (see load_photo), so that undistortion would cut off its borders.
 bool too_wide_to_undistort(const LensModel& lens);
 
-/// The lens of the same photo scaled to width x height.
+/// The lens for the same photo scaled to width x height.
 LensModel scale_lens(const LensModel& lens, int width, int height);
 
-/// Size, focal lengths and principal point of the photos, without pose and distortion.
+/// A camera with the photos' size, focal lengths and principal point, without pose or distortion.
 Camera pinhole_camera(const LensModel& lens);
 
 class Lens {
   public:
-    explicit Lens(const LensModel& model);  // checked by check_lens
+    explicit Lens(const LensModel& model);  // model: has passed check_lens
 
     /// ray: x/z, y/z of a point before the camera. Returns px. For rays beyond the fold of the
-    /// distortion (where it stops being one to one) see valid.
+    /// distortion (where it stops being one to one), see valid().
     glm::dvec2 project(glm::dvec2 ray) const;
     /// The inverse, by damped Newton; nothing where it does not converge to 1e-9 on this side of
     /// the fold, or the ray is 90 degrees or more off the axis.
     std::optional<glm::dvec2> unproject(glm::dvec2 pixel) const;
     bool valid(glm::dvec2 ray) const;
-    /// The same lens for the projection passes. size: of the frame, px, whose rays bound those at
-    /// which the Jacobian is taken; corners that no ray below 84 degrees reaches are left out.
+    /// The lens as the projection passes take it. size: of the frame, px; the rays of its border
+    /// bound those at which the Jacobian is taken. Corners that no ray below 84 degrees reaches are
+    /// left out.
     LensTerms terms(glm::dvec2 size) const;
 
     glm::dvec2 focal{1.0}, principal{0.0};  // px

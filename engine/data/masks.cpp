@@ -1,7 +1,7 @@
 #include "engine/data/masks.h"
 
-#include <algorithm>
 #include <fmt/format.h>
+#include <algorithm>
 #include <iterator>
 #include <map>
 
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 namespace {
 
 bool holds_pictures(const fs::path& folder) {
-    std::error_code none;  // no such folder: no entries
+    std::error_code none;  // a missing folder has no entries
     return std::any_of(
         fs::recursive_directory_iterator(folder, none), {}, [](const fs::directory_entry& entry) {
             return is_photo_name(entry.path()) || is_foreign_picture_name(entry.path());
@@ -35,7 +35,7 @@ fs::path find_mask(const fs::path& masks, const std::string& name) {
     return {};
 }
 
-/// What is left of a file's name, in lower case, without extensions of pictures and "mask".
+/// A file's name in lower case, without picture extensions and "mask".
 std::string bare_name(const fs::path& path) {
     std::string name = lower_case(path.filename().string());
     for (bool more = true; more;) {
@@ -51,7 +51,7 @@ std::string bare_name(const fs::path& path) {
     return name;
 }
 
-/// The folders of a name: what may differ is that one of two has none.
+/// Whether the folders of two names agree; either may lack folders that the other has.
 bool folders_agree(const fs::path& a, const fs::path& b) {
     const std::string one = lower_case(a.parent_path().generic_string()),
                       two = lower_case(b.parent_path().generic_string());
@@ -59,7 +59,7 @@ bool folders_agree(const fs::path& a, const fs::path& b) {
            two.ends_with("/" + one);
 }
 
-/// Masks of views that have none yet, by their bare names, where there is no doubt.
+/// Finds masks for views without one by their bare names, where these are unambiguous.
 void find_masks_by_bare_name(const fs::path& masks, Dataset& dataset) {
     std::multimap<std::string, fs::path> files;
     std::error_code none;
@@ -78,7 +78,7 @@ void find_masks_by_bare_name(const fs::path& masks, Dataset& dataset) {
     }
 }
 
-/// NAME_mask.png and the like beside the photos. Returns how many.
+/// Takes NAME_mask.png and the like beside the photos. Returns how many it found.
 std::size_t find_masks_beside_photos(Dataset& dataset) {
     std::size_t found = 0;
     for (View& view : dataset.views) {
@@ -143,7 +143,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The photos that have masks as colmap was given them, with their lenses, at their own size.
+/// The photos whose masks were given to COLMAP, with their lenses, at full size.
 Dataset masked_photos(const ColmapRun& run) {
     const fs::path sparse = run.workspace / "sparse";
     const ColmapModel model = read_colmap(sparse / largest_colmap_model(sparse));

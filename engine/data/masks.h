@@ -1,4 +1,4 @@
-// Masks that lie beside the photos, by the names that COLMAP, RealityCapture and people give them.
+// Masks beside the photos, by the names that COLMAP, RealityCapture and people give them.
 #pragma once
 
 #include <cstddef>
@@ -10,28 +10,28 @@
 
 namespace darb {
 
-/// FOLDER/masks or, where it holds no pictures, FOLDER/mask, in whatever case; empty where neither
-/// does.
+/// FOLDER/masks or, where that holds no pictures, FOLDER/mask, ignoring case; empty where neither
+/// holds any.
 std::filesystem::path masks_folder(const std::filesystem::path& folder);
 
-/// Gives every view its mask in masks_folder(folder), with a note where some have none: of the
-/// photo's name, a leading "images/" left out or not, with the extension of a picture in place of
-/// the photo's or added to it, after ".mask" or not; else the one file whose name is the photo's
-/// but for case, folders that one of them lacks, a second extension and "mask". Where there is no
-/// such folder, NAME_mask.png and the like beside the photos. Where neither is, a note names
-/// folders that may have been meant. Throws Error where a folder has none of a view and photos are
-/// asked for.
+/// Gives every view its mask from masks_folder(folder), with a note where some have none. A mask
+/// has the photo's name, with or without a leading "images/", with a picture extension in place of
+/// the photo's or added to it, and possibly ".mask" before that; failing that, it is the only file
+/// whose name matches the photo's apart from case, missing folders, a second extension and "mask".
+/// Where there is no such folder, NAME_mask.png and the like beside the photos are taken. Where
+/// these do not exist either, a note names folders that may have been meant. Throws Error where the
+/// folder holds no mask for any view and photos are required.
 void add_masks(const std::filesystem::path& folder, const DatasetOptions& options,
                Dataset& dataset);
 
-// Masks of photos that colmap straightened: it leaves them behind.
+// Masks of photos that COLMAP has undistorted, because COLMAP does not take masks along.
 
-/// Straightens the masks beside run.photos, as add_masks finds them, by the lenses of the model
-/// that colmap found in run.workspace/sparse and the pinholes of run.workspace/dense, as
-/// image_undistorter straightened the photos. They go to run.workspace/dense/masks, 8-bit grey of
-/// each photo's name and ".png", where load_dataset of run.workspace/dense finds them: bilinear,
-/// and 0 where the lens sees nothing. The folder appears when all are written. Does nothing where
-/// it is there. Returns how many photos have one. Throws Error naming the file.
+/// Undistorts the masks beside run.photos, as add_masks finds them, from the lenses of the model in
+/// run.workspace/sparse to the pinholes of run.workspace/dense, as image_undistorter did with the
+/// photos. They are written to run.workspace/dense/masks, where load_dataset of run.workspace/dense
+/// finds them, as 8-bit grey PNG with each photo's name and ".png": sampled bilinearly, and 0 where
+/// the lens sees nothing. The folder appears only when all are written. Does nothing where it
+/// exists. Returns how many photos have a mask. Throws Error naming the file.
 std::size_t straighten_masks(const ColmapRun& run);
 
 }  // namespace darb

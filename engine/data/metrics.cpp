@@ -69,7 +69,7 @@ void filter_row(const ImageF& a, const ImageF& b, int y, int channel, const Wind
         }
 }
 
-/// The index at one pixel, from the filtered moments.
+/// SSIM at one pixel, from the filtered moments.
 float ssim_at(const float* moments, std::size_t stride) {
     const float p = moments[0], q = moments[stride];
     const float var_p = moments[2 * stride] - p * p, var_q = moments[3 * stride] - q * q;
@@ -78,7 +78,8 @@ float ssim_at(const float* moments, std::size_t stride) {
            ((p * p + q * q + kC1) * (var_p + var_q + kC2));
 }
 
-/// Sum of the index over rows [begin, end) of one channel. A ring holds the last 11 filtered rows.
+/// Sum of SSIM over rows [begin, end) of one channel. A ring buffer holds the last 11 filtered
+/// rows.
 double ssim_rows(const ImageF& a, const ImageF& b, int channel, int begin, int end) {
     static const Window window = gaussian_window();
     const auto width = static_cast<std::size_t>(a.width);

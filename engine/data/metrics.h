@@ -1,12 +1,12 @@
-// PSNR and SSIM on the CPU, as the field reports them.
+// PSNR and SSIM on the CPU, as papers on splatting report them.
 #pragma once
 
 #include "engine/core/image.h"
 
 namespace darb {
 
-/// Both images have the same size; values are clamped to [0, 1] first. With 4 channels the first
-/// three count: composite over a background before.
+/// Both images must have the same size; values are clamped to [0, 1] first. Of 4 channels only the
+/// first three count, so composite over a background before.
 
 /// 10 log10(1 / mean squared error) in dB over all pixels and channels; infinity for equal images.
 double psnr(const ImageF& image, const ImageF& truth);
@@ -15,7 +15,7 @@ double psnr(const ImageF& image, const ImageF& truth);
 /// pixels and channels.
 double ssim(const ImageF& image, const ImageF& truth, int threads = 2);
 
-/// [0, 255] to [0, 1].
+/// Maps [0, 255] to [0, 1].
 ImageF to_float(const ImageU8& image);
 
 }  // namespace darb

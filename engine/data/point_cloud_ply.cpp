@@ -1,8 +1,8 @@
 #include "engine/data/point_cloud_ply.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <nanoflann.hpp>
 
 #include "engine/core/error.h"
@@ -112,7 +112,7 @@ namespace {
 
 constexpr double kMinDistance2 = 1e-7;
 constexpr double kPointOpacity = 0.95;
-constexpr double kSizeShare = 1.0 / 3;  // of the distance to the neighbours
+constexpr double kSizeShare = 1.0 / 3;  // share of the distance to the neighbours
 constexpr double kLargestOfMedian = 4;
 
 struct CloudView {

@@ -1,11 +1,11 @@
 // Photos: decode, mask, undistort, scale; many at once.
+#include <fmt/format.h>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <condition_variable>
 #include <cstdint>
 #include <exception>
-#include <fmt/format.h>
 #include <map>
 #include <mutex>
 #include <new>
@@ -29,16 +29,16 @@ bool same_aspect(const ImageU8& image, int width, int height) {
     return std::abs(image.height - wanted) <= 1.5 + 0.01 * wanted;
 }
 
-/// The most that load_photo holds at a time: what libjpeg keeps of a progressive photo, its pixels
-/// as stored, as RGBA and undistorted.
+/// The most memory that load_photo holds at a time: libjpeg's buffers for a progressive photo, and
+/// the pixels as stored, as RGBA and undistorted.
 std::uint64_t bytes_while_loading(const View& view) {
     constexpr std::uint64_t kBytesPerPixel = 16;
     return kBytesPerPixel * static_cast<std::uint64_t>(std::max(view.lens.width, 1)) *
            static_cast<std::uint64_t>(std::max(view.lens.height, 1));
 }
 
-/// Lets photos through while the bytes that they take together are within a budget, and one in any
-/// case.
+/// Admits photos while the memory that they take together is within a budget; a single photo is
+/// always admitted.
 class MemoryGate {
   public:
     explicit MemoryGate(std::uint64_t budget) : left_(budget), budget_(budget) {}
@@ -70,7 +70,7 @@ std::uint64_t bytes_loaded(const View& view) {
            static_cast<std::uint64_t>(view.camera.height);
 }
 
-/// Before the first is read: what they take when all are there.
+/// Throws Error, before the first photo is read, where all of them will take too much memory.
 void check_memory(const std::vector<View>& views, std::uint64_t free) {
     std::uint64_t all = 0;
     for (const View& view : views) {
@@ -87,7 +87,7 @@ void check_memory(const std::vector<View>& views, std::uint64_t free) {
                      "Load them smaller with -r 2, 4 or 8, or free memory.");
 }
 
-/// Alpha 0 where a pixel is farther than `radius` px from the middle.
+/// Sets alpha to 0 where a pixel is farther than `radius` px from the middle.
 void crop_to_circle(ImageU8& rgba, double radius) {
     for (int y = 0; y < rgba.height; ++y)
         for (int x = 0; x < rgba.width; ++x)
@@ -121,7 +121,7 @@ ImageU8 turn_with_photo(ImageU8 image, const View& view, const std::filesystem::
     const int height = turned ? view.lens.width : view.lens.height;
     if (same_aspect(image, width, height)) return orient_image(image, view.orientation);
     if (same_aspect(image, height, width)) {
-        if (turned) return image;  // as viewers show the photo, and so it is
+        if (turned) return image;  // made for the photo as viewers show it
         const int shown = read_image_info(view.photo).orientation;
         // 6 and 8 undo each other, 5 and 7 themselves.
         if (shown >= 5) return orient_image(image, shown == 6 ? 8 : shown == 8 ? 6 : shown);
@@ -171,13 +171,13 @@ std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads,
     return photos;
 }
 
-// How much of the photos is detail, and which of them teach nothing.
+// Measures how much detail the photos have, and finds those that teach nothing.
 
 namespace {
 
 constexpr std::size_t kPhotos = 8;
 
-// Rec. 601.
+// Luma of Rec. 601, 0 to 1.
 double grey(const ImageU8& photo, int x, int y) {
     return (0.299 * photo.at(x, y, 0) + 0.587 * photo.at(x, y, 1) + 0.114 * photo.at(x, y, 2)) /
            255;
@@ -193,10 +193,10 @@ double detail_at(const ImageU8& photo, int x, int y) {
                     grey(photo, x, y - 1) - grey(photo, x, y + 1));
 }
 
-constexpr std::size_t kNamed = 3;        // photos, in a sentence
-constexpr std::uint8_t kLeastAlpha = 8;  // below, nothing of the pixel is learned
+constexpr std::size_t kNamed = 3;        // photos that a sentence names
+constexpr std::uint8_t kLeastAlpha = 8;  // below this alpha, a pixel teaches nothing
 constexpr std::uint8_t kMostOfBlack = 3;
-constexpr std::size_t kCompared = 64;  // bytes of a photo, before it is compared as a whole
+constexpr std::size_t kCompared = 64;  // bytes compared before the whole photo is
 
 std::string names_of(const Dataset& dataset, const std::vector<std::size_t>& views) {
     std::string names;
@@ -212,7 +212,7 @@ bool is_hidden(const ImageU8& photo) {
     return true;
 }
 
-// Of what is not hidden.
+// Whether every pixel that is not hidden is black.
 bool is_black(const ImageU8& photo) {
     for (std::size_t at = 0; at + 3 < photo.data.size(); at += 4)
         if (photo.data[at + 3] >= kLeastAlpha &&
@@ -221,7 +221,7 @@ bool is_black(const ImageU8& photo) {
     return true;
 }
 
-// Photos that another one equals, the first of each kind with them.
+// Groups of equal photos; each group begins with the first of its kind.
 std::vector<std::vector<std::size_t>> repeats(const std::vector<std::size_t>& views,
                                               const std::vector<ImageU8>& photos) {
     std::map<std::vector<std::uint8_t>, std::vector<std::vector<std::size_t>>> kinds;
@@ -259,7 +259,7 @@ std::vector<std::vector<std::size_t>> repeats(const std::vector<std::size_t>& vi
 }  // namespace
 
 std::vector<std::string> photo_doubts(const Dataset& dataset, const std::vector<ImageU8>& photos) {
-    if (photos.size() != dataset.views.size()) return {};  // which training refuses
+    if (photos.size() != dataset.views.size()) return {};  // training refuses these
     std::vector<std::size_t> training, hidden, black, seen;
     for (std::size_t i = 0; i < dataset.views.size(); ++i)
         if (!dataset.views[i].is_test && photos[i].channels == 4 && !photos[i].data.empty())

@@ -9,11 +9,11 @@ namespace darb {
 
 struct Region {
     glm::dvec3 centre;  // world
-    glm::dvec3 half;    // of its sides
+    glm::dvec3 half;    // half the lengths of the sides, world units
 };
 
-/// Of the training views: the cube around the point that their optical axes come closest to, as
-/// wide as the photos show there, or the box of the cameras where the axes are parallel.
+/// The cube around the point that the optical axes of the training views come closest to, as wide
+/// as the photos show there; where the axes are parallel, the bounding box of the cameras.
 Region region_in_view(const Dataset& dataset);
 
 }  // namespace darb

@@ -70,8 +70,9 @@ ImageU8 to_rgba(ImageU8 image) {
 
 namespace {
 
-/// What a mask says of its pixels, 0 to 255. It is in the colour, 0 and 1 standing for 0 and 255.
-/// Where the alpha channel varies it is there; in both where the colour is black and white as well.
+/// The values of a mask, 0 to 255. They are in its colour, where 0 and 1 may stand for 0 and 255.
+/// Where the alpha channel varies, they are there; where the colour is black and white as well, in
+/// both.
 class MaskValues {
   public:
     explicit MaskValues(const ImageU8& mask)

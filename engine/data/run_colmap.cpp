@@ -1,5 +1,11 @@
 #include "engine/data/run_colmap.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
@@ -8,17 +14,11 @@
 #include <csignal>
 #include <cstdlib>
 #include <deque>
-#include <fcntl.h>
-#include <fmt/format.h>
 #include <fstream>
 #include <map>
 #include <optional>
-#include <poll.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
 #include <system_error>
 #include <thread>
-#include <unistd.h>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -28,14 +28,14 @@ namespace darb {
 
 namespace {
 
-// Time of the mapper over the number of photos: with this power on recorded runs.
+// The mapper's time grows with this power of the number of photos, measured on recorded runs.
 constexpr double kMapperPower = 1.5;
 
 bool is_digit(char c) {
     return c >= '0' && c <= '9';
 }
 
-/// The number that `text` begins with, which is taken off; false where it begins with none.
+/// Takes off the number that `text` begins with; returns false where there is none.
 bool take_number(std::string_view& text, std::size_t& number) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc{}) return false;
@@ -51,7 +51,7 @@ bool take(std::string_view& text, char c) {
     return true;
 }
 
-/// What stands behind the first of these words; nothing where none is there.
+/// Finds what follows the first of these words that occurs; returns false where none does.
 bool find_behind(std::string_view text, std::initializer_list<std::string_view> words,
                  std::string_view& behind) {
     for (const std::string_view word : words)
@@ -66,7 +66,7 @@ struct Counts {
     std::size_t a = 0, of_a = 0, b = 1, of_b = 1;
 };
 
-/// "3/60]" or "1/4, 2/4]", taken off.
+/// Takes off "3/60]" or "1/4, 2/4]".
 bool take_counts(std::string_view& text, Counts& counts) {
     if (!take_number(text, counts.a) || !take(text, '/') || !take_number(text, counts.of_a))
         return false;
@@ -77,7 +77,7 @@ bool take_counts(std::string_view& text, Counts& counts) {
            counts.b <= counts.of_b && counts.of_a <= 10'000'000 && counts.of_b <= 10'000'000;
 }
 
-/// The text behind the head of glog, "I20250412 20:08:49.215745 96464 file.cc:390] ".
+/// The line without the head that glog writes, "I20250412 20:08:49.215745 96464 file.cc:390] ".
 std::string_view without_head(std::string_view line) {
     if (line.size() > 2 && std::string_view("IWEF").find(line[0]) != std::string_view::npos &&
         is_digit(line[1]))
@@ -87,7 +87,7 @@ std::string_view without_head(std::string_view line) {
     return line;
 }
 
-/// " in 45.332s" or "in 7.1s": how long a part took that is done.
+/// Whether the text is " in 45.332s" or "in 7.1s": the time of a part that is done.
 bool is_duration(std::string_view text) {
     while (text.starts_with(' ')) text.remove_prefix(1);
     while (text.ends_with(' ') || text.ends_with('\r')) text.remove_suffix(1);
@@ -122,7 +122,7 @@ bool ColmapOutput::read_match(std::string_view text) {
     }
     const std::size_t parts_done = parts_begun_ - (ended ? 0 : 1);
     if (pairs_ == 0) return set(std::max(done_, parts_done), parts_);
-    // Blocks hold about as many pairs each.
+    // The blocks hold roughly equal numbers of pairs.
     const double share = double(parts_done) / double(parts_);
     return set(std::max(done_, std::size_t(std::llround(share * double(pairs_)))), pairs_);
 }
@@ -132,7 +132,7 @@ bool ColmapOutput::read_map(std::string_view text) {
     std::size_t number = 0;
     if (find_behind(text, {"Initializing with image pair #", "Registering initial image pair #"},
                     behind)) {
-        if (done_ > 2) ++model_;  // two alone were given up
+        if (done_ > 2) ++model_;  // a model of two photos was given up
         return set(2, photos_);
     }
     if (!find_behind(text, {"Registering image #"}, behind) || !take_number(behind, number) ||
@@ -185,8 +185,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kKeptLines = 8;  // shown when a command fails
-constexpr int kTick_ms = 500;          // between two looks at the stop, and two reports
+constexpr std::size_t kKeptLines = 8;  // printed lines shown when a command fails
+constexpr int kTick_ms = 500;  // between checks of the stop flag; every second one also reports
 constexpr const char* kOptionsFile = "options.txt";
 
 std::string joined(const auto& lines) {
@@ -197,12 +197,12 @@ std::string joined(const auto& lines) {
 
 constexpr const char* kPhotosHint =
     "Photos need 60 % overlap and texture; see what colmap says above.";
-// A camera that stands still, or turns alone, shows no depth.
+// A camera that stands still, or only turns, shows no depth.
 constexpr const char* kMotionHint =
     "The camera must move between photos, around the scene; they need 60 % overlap, texture, and "
     "no blur.";
 
-// For people, and for their shell.
+// The command as a user would type it in a shell.
 std::string shell_text(const ColmapCommand& command) {
     std::string text = "QT_QPA_PLATFORM=offscreen";
     for (const std::string& word : command) {
@@ -215,8 +215,8 @@ std::string shell_text(const ColmapCommand& command) {
     return text;
 }
 
-/// A program that runs, with its output in a pipe. It ends when this process does, however that
-/// ends, and is ended with this object.
+/// A running program whose output goes to a pipe. It is ended when this process ends, however that
+/// happens, or when this object is destroyed.
 class ColmapProcess {
   public:
     explicit ColmapProcess(const ColmapCommand& command);
@@ -227,7 +227,7 @@ class ColmapProcess {
     ColmapProcess(const ColmapProcess&) = delete;
     ColmapProcess& operator=(const ColmapProcess&) = delete;
     int output() const { return output_; }
-    /// Its exit status as waitpid() has it.
+    /// Waits for it and returns its exit status, as waitpid() reports it.
     int wait() {
         int status = -1;
         while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
@@ -257,7 +257,7 @@ ColmapProcess::ColmapProcess(const ColmapCommand& command) {
         throw Error("colmap", "cannot be started", "Free memory or processes.");
     const pid_t parent = ::getpid();
     pid_ = ::fork();
-    if (pid_ == 0) {  // only what a signal handler may do: there may be other threads
+    if (pid_ == 0) {  // only calls that a signal handler may make: there may be other threads
         ::prctl(PR_SET_PDEATHSIG, SIGKILL);
         if (::getppid() != parent) ::_exit(127);
         const int nothing = ::open("/dev/null", O_RDONLY);
@@ -273,7 +273,7 @@ ColmapProcess::ColmapProcess(const ColmapCommand& command) {
 }
 
 void ColmapProcess::end() {
-    constexpr int kPatience = 20, kPause_ms = 100;  // 2 s to end by itself
+    constexpr int kPatience = 20, kPause_ms = 100;  // it has 2 s to end by itself
     ::kill(pid_, SIGTERM);
     for (int i = 0; i < kPatience; ++i) {
         if (::waitpid(pid_, nullptr, WNOHANG) != 0) {
@@ -290,8 +290,8 @@ bool is_stopped(const std::atomic<bool>* stop) {
     return stop != nullptr && stop->load();
 }
 
-/// Passes on each line, and with whole = false what is there of one that is not ended; on_tick
-/// twice a second. The exit status. Throws ColmapStopped.
+/// Passes on each line and, with whole = false, the beginning of a line that has not ended; calls
+/// on_tick twice a second. Returns the exit status. Throws ColmapStopped.
 int run_process(const ColmapCommand& command, const std::atomic<bool>* stop,
                 const std::function<void(std::string_view line, bool whole)>& on_line,
                 const std::function<void()>& on_tick) {
@@ -317,14 +317,14 @@ int run_process(const ColmapCommand& command, const std::atomic<bool>* stop,
     }
     if (!rest.empty()) on_line(rest, true);
     const int status = process.wait();
-    // A Ctrl-C of the terminal reaches colmap, too, and maybe sooner than this process.
+    // A Ctrl-C in the terminal reaches COLMAP as well, and maybe earlier than this process.
     for (int i = 0; i < 5 && WIFSIGNALED(status) && stop != nullptr && !is_stopped(stop); ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     if (is_stopped(stop)) throw ColmapStopped{};
     return status;
 }
 
-/// What a command prints, whatever becomes of it: some versions call their help a failure.
+/// What a command prints, whatever its exit status: some versions report their help as a failure.
 std::string colmap_output_of(const ColmapCommand& command, const std::atomic<bool>* stop) {
     std::string text;
     run_process(command, stop,
@@ -358,7 +358,8 @@ bool lists(const std::string& help, const std::string& option) {
     return false;
 }
 
-// The first of these names that the version knows; none: the option is left out.
+// Adds the first of these names that the version knows; where it knows none, the option is left
+// out.
 void add_option(ColmapCommand& command, const std::string& help,
                 std::initializer_list<const char*> names, const std::string& value) {
     for (const char* name : names) {
@@ -369,8 +370,8 @@ void add_option(ColmapCommand& command, const std::string& help,
     }
 }
 
-// Small enough that there is something to tell while they are matched, and that little is lost
-// where it is ended: a block is saved as a whole. Large enough to keep the cores busy.
+// Small enough to show progress while blocks are matched, and to lose little when COLMAP is ended,
+// as a block is saved as a whole. Large enough to keep the cores busy.
 std::size_t block_size(std::size_t photos) {
     const double cores = std::max(1u, std::thread::hardware_concurrency());
     const auto busy = static_cast<std::size_t>(std::ceil(std::sqrt(8 * cores)));
@@ -383,7 +384,7 @@ bool matches_neighbours(const ColmapRun& run) {
 
 ColmapCommand extractor(const ColmapRun& run, const ColmapPaths& paths, const ColmapHelp& help) {
     const std::string part = help.has_new_names() ? "Feature" : "Sift";
-    // OPENCV: phones and consumer cameras; the undistorter turns it into a pinhole.
+    // OPENCV suits phones and consumer cameras; the undistorter turns it into a pinhole.
     ColmapCommand command{"colmap",
                           "feature_extractor",
                           "--database_path",
@@ -452,7 +453,7 @@ ColmapCommand mapper(const ColmapRun& run, const ColmapPaths& paths, const Colma
 
 }  // namespace
 
-// The mapper need not number it 0.
+// The mapper's largest model need not have the number 0.
 std::string largest_colmap_model(const fs::path& sparse) {
     const std::map<std::string, std::size_t> models = models_below(sparse);
     if (models.empty()) return {};
@@ -505,7 +506,7 @@ constexpr const char* effort_name(ColmapEffort effort) {
                                               : "usual";
 }
 
-/// One call of run_colmap.
+/// The state of one call of run_colmap.
 class ColmapRunner {
   public:
     ColmapRunner(const ColmapRun& run, const ColmapReports& reports)
@@ -516,13 +517,13 @@ class ColmapRunner {
     struct Attempt {
         fs::path folder;
         ColmapEffort effort;
-        std::size_t found;  // photos of the largest model
+        std::size_t found;  // photos in the largest model
     };
     void note(const std::string& text) const {
         if (reports_.note) reports_.note(text);
     }
     void ask_for_help();
-    /// Throws Error where the command fails, unless it may.
+    /// Throws Error where the command fails, unless may_fail.
     void step(ColmapStep step, const ColmapCommand& command, bool may_fail = false);
     Attempt attempt(std::size_t number, ColmapEffort effort);
     void find_cameras();
@@ -535,7 +536,7 @@ class ColmapRunner {
     const ColmapReports& reports_;
     ColmapHelp help_;
     std::size_t photos_ = 0, features_ = 0;  // features: of most photos; 0: not known
-    std::string failure_;                    // of the last mapper
+    std::string failure_;                    // what the last mapper failed with
 };
 
 void remove_folder(const fs::path& path) {
@@ -567,7 +568,7 @@ void ColmapRunner::ask_for_help() {
     const auto ask = [&](const char* command) {
         return colmap_output_of({"colmap", command, "-h"}, run_.stop);
     };
-    help_.extractor = ask("feature_extractor") + "\n";  // not empty: asked
+    help_.extractor = ask("feature_extractor") + "\n";  // not empty, to show that it was asked
     help_.matcher = ask(matches_neighbours(run_) ? "sequential_matcher" : "exhaustive_matcher");
     if (run_.effort == ColmapEffort::thorough) help_.mapper = ask("mapper");
 }
@@ -591,7 +592,8 @@ void ColmapRunner::step(ColmapStep step, const ColmapCommand& command, bool may_
         if (!reports_.progress) return;
         const double left =
             colmap_seconds_left(step, seconds_at_change, output.done(), output.total());
-        // Between two changes it counts down; what takes longer than told is not known any more.
+        // Counts down between two changes; once a step takes longer than estimated, the time left
+        // is unknown.
         const double now = since_start(), rest = left + seconds_at_change - now;
         reports_.progress(number, output, now, rest > 0 ? rest : -1);
     };
@@ -635,7 +637,7 @@ ColmapRunner::Attempt ColmapRunner::attempt(std::size_t number, ColmapEffort eff
                    unfinished = folder / "sparse.unfinished", sparse = folder / "sparse";
     const std::vector<ColmapCommand> commands =
         colmap_commands(run_, {folder / "database.db", unfinished, {}, {}}, help_);
-    // The block size says nothing about the result, and follows the machine.
+    // The block size does not affect the result, and depends on the machine.
     std::string options = std::string(effort_name(effort)) + "\n";
     for (const ColmapStep i : {ColmapStep::extract, ColmapStep::match, ColmapStep::map})
         for (std::size_t w = 1; w < commands[std::size_t(i)].size(); ++w) {
@@ -644,7 +646,7 @@ ColmapRunner::Attempt ColmapRunner::attempt(std::size_t number, ColmapEffort eff
         }
     const fs::path options_file = folder / kOptionsFile;
     if (!fs::exists(options_file) || read_text_file(options_file) != options) {
-        remove_folder(folder);  // of other options
+        remove_folder(folder);  // it was made with other options
         write_file_atomic(options_file, options);
     }
     if (!fs::exists(sparse)) {
@@ -693,7 +695,7 @@ void ColmapRunner::find_cameras() {
     keep(*best);
 }
 
-// sparse is moved last: where it is there, all is.
+// sparse is moved last, so that everything is complete where it exists.
 void ColmapRunner::keep(const Attempt& best) const {
     for (const char* part : {"database.db", kOptionsFile, "sparse"})
         move_over(best.folder / part, run_.workspace / part);

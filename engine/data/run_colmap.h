@@ -14,25 +14,27 @@ namespace darb {
 enum class ColmapStep { extract, match, map, undistort };
 constexpr std::size_t kColmapSteps = 4;
 
-/// What one step has printed so far.
+/// Follows what one step prints.
 class ColmapOutput {
   public:
-    /// photos: of the folder; 0: not known. pairs: that an exhaustive matcher compares, else 0.
+    /// photos: number of photos in the folder; 0: not known. pairs: number of pairs that an
+    /// exhaustive matcher compares, else 0.
     ColmapOutput(ColmapStep step, std::size_t photos, std::size_t pairs)
         : step_(step), photos_(photos), pairs_(pairs) {}
 
-    /// A line, or the beginning of one that is not ended yet. Whether done() or total() changed.
+    /// Reads a line, or the beginning of one that has not ended. Returns whether done() or total()
+    /// changed.
     bool read(std::string_view line);
 
-    /// Photos, or pairs of photos where unit() says so. total() is 0 until it is known.
+    /// In photos or pairs of photos, as unit() says. total() is 0 until it is known.
     std::size_t done() const { return done_; }
     std::size_t total() const { return total_; }
     const char* unit() const {
         return step_ == ColmapStep::match && pairs_ > 0 ? "pairs" : "photos";
     }
-    /// Of the mapper: which of its models the photos are being added to, from 1.
+    /// Mapper only: which of its models the photos are being added to, from 1.
     std::size_t model() const { return model_; }
-    /// Of the extractor: what it said of each photo, in its order.
+    /// Extractor only: the number of features it found in each photo, in its order.
     const std::vector<std::size_t>& features() const { return features_; }
 
   private:
@@ -42,50 +44,53 @@ class ColmapOutput {
 
     ColmapStep step_;
     std::size_t photos_, pairs_, done_ = 0, total_ = 0, model_ = 1;
-    std::size_t parts_begun_ = 0, parts_ = 0;  // of the matcher: blocks, or photos
+    std::size_t parts_begun_ = 0, parts_ = 0;  // matcher only: blocks, or photos
     std::vector<std::size_t> features_;
 };
 
-/// What is left of a step that took `seconds` for `done` of `total`; below 0: not known. The mapper
-/// adjusts all photos again and again, so that each takes longer than the one before.
+/// Estimates the time left, in seconds, of a step that took `seconds` for `done` of `total`; below
+/// 0: not known. The mapper adjusts all photos again and again, so that each takes longer than the
+/// one before.
 double colmap_seconds_left(ColmapStep step, double seconds, std::size_t done, std::size_t total);
 
-/// How hard COLMAP looks. quick: fewer features. thorough: more and fainter ones, and cameras from
+/// How hard COLMAP tries. quick: fewer features. thorough: more and fainter ones, and cameras from
 /// fewer matches.
 enum class ColmapEffort { quick, usual, thorough };
 
 struct ColmapRun {
     std::filesystem::path photos;      // a folder of PNG and JPEG files
     std::filesystem::path workspace;   // made where missing; holds the data set afterwards
-    std::filesystem::path masks = {};  // a folder: no features where they are black; may be empty
-    bool sequential = false;           // neighbours in name order only: for video frames
-    bool single_camera = true;         // all photos by one camera at one zoom
-    int max_image_size = 1600;         // px, of the undistorted photos
-    std::size_t count = 0;             // of the photos; 0: not known
-    ColmapEffort effort = ColmapEffort::usual;  // to begin with
-    bool quick_sequential = false;              // as sequential, for the quick effort alone
-    const std::atomic<bool>* stop = nullptr;    // set: colmap is ended and ColmapStopped thrown
+    std::filesystem::path masks = {};  // a folder: no features where black; may be empty
+    bool sequential = false;           // match only neighbours in name order: for video frames
+    bool single_camera = true;         // all photos were taken by one camera at one zoom
+    int max_image_size = 1600;         // the larger side of undistorted photos, px
+    std::size_t count = 0;             // number of photos; 0: not known
+    ColmapEffort effort = ColmapEffort::usual;  // the effort to begin with
+    bool quick_sequential = false;              // match sequentially, but at the quick effort only
+    const std::atomic<bool>* stop = nullptr;    // when set: ends COLMAP, throws ColmapStopped
 };
 
-/// What a run tells while it works; any may be empty.
+/// What a run reports while it works; any function may be empty.
 struct ColmapReports {
-    std::function<void(std::string_view)> line = {};  // what colmap prints
+    std::function<void(std::string_view)> line = {};  // a line that COLMAP printed
     std::function<void(std::string_view)> note = {};  // a sentence, or the command that begins
-    /// After each change, and once a second. seconds: of this step. left: below 0 where not known.
+    /// Called after each change, and once a second. seconds: spent in this step. left: below 0
+    /// where not known.
     std::function<void(std::size_t step, const ColmapOutput& output, double seconds, double left)>
         progress = {};
 };
 
-/// run.stop was set. What was done is kept: the same run goes on from there.
+/// Thrown when run.stop was set. Finished work is kept, and the next run with the same options
+/// continues from there.
 struct ColmapStopped {};
 
-/// A step of an attempt: the words of a command, without a shell's quotes.
+/// One step of an attempt: the words of a command, without shell quotes.
 using ColmapCommand = std::vector<std::string>;
 
-/// What an installed version knows, from its help texts; empty: nothing was found out.
+/// The help texts of the installed version, which show what it knows; empty: not available.
 struct ColmapHelp {
     std::string extractor = {}, matcher = {}, mapper = {};
-    /// Whether the GPU options have their new names.
+    /// Whether the GPU options have the names of later versions.
     bool has_new_names() const;
 };
 
@@ -93,35 +98,35 @@ struct ColmapHelp {
 struct ColmapPaths {
     std::filesystem::path database, models, model, dense;
 };
-/// All below run.workspace: database.db, sparse, sparse/0, dense.
+/// All in run.workspace: database.db, sparse, sparse/0, dense.
 ColmapPaths plain_paths(const ColmapRun& run);
 
 /// The four commands, in order: feature_extractor, matcher, mapper, image_undistorter. Options that
-/// only help are given where `help` lists them.
+/// COLMAP could do without are given only where `help` lists them.
 std::vector<ColmapCommand> colmap_commands(const ColmapRun& run, const ColmapPaths& paths,
                                            const ColmapHelp& help = {});
 
-/// Runs them. Where fewer than kEnoughPhotos of the photos get a camera, or none, it tries again
-/// with the next effort and keeps the model that holds the most photos. Returns the data set's
-/// folder (workspace/dense, with images and sparse); its model is workspace/sparse, and all that
-/// was printed is in workspace/colmap.log. What an earlier run left that was ended is used where
-/// the options are the same. Throws Error: with the commands in its hint where colmap is not
-/// installed, with the last lines printed where a command fails; ColmapStopped.
+/// Runs the commands. Where less than a share kEnoughPhotos of the photos get a camera, it tries
+/// again with the next effort, and keeps the model that holds the most photos. Returns the data
+/// set's folder (workspace/dense, with images and sparse); the model is workspace/sparse, and
+/// everything that COLMAP printed is in workspace/colmap.log. What an interrupted run left is used
+/// again where the options are equal. Throws Error with the commands in its hint where COLMAP is
+/// not installed, or with the last printed lines where a command fails; and ColmapStopped.
 std::filesystem::path run_colmap(const ColmapRun& run, const ColmapReports& reports);
 
-constexpr double kEnoughPhotos = 0.8;  // a share
+constexpr double kEnoughPhotos = 0.8;  // share of the photos
 
 /// The effort that made workspace/sparse; usual where it is not known.
 ColmapEffort effort_of_colmap(const std::filesystem::path& workspace);
 
-/// Name of the model below `sparse` with the most images, the first of equals; empty where there is
-/// none.
+/// The name of the model in `sparse` that has the most images, the first of equals; empty where
+/// there is none.
 std::string largest_colmap_model(const std::filesystem::path& sparse);
 
-/// In single quotes, for the shell.
+/// The path in single quotes, for a shell.
 std::string shell_quoted(const std::filesystem::path& path);
 
-/// Whether the shell finds a program of that name.
+/// Whether the shell finds a program with this name.
 bool is_installed(const std::string& program);
 
 }  // namespace darb

@@ -27,7 +27,7 @@ struct Field {
     Kind kind;
 };
 
-// JSON has null for NaN and infinity.
+// JSON has null in place of NaN and infinity.
 bool is_of(Kind kind, const EventJson& value) {
     switch (kind) {
         case Kind::count:
@@ -72,7 +72,7 @@ const char* name_of(Kind kind) {
     return "";
 }
 
-// Of any event; a key that is missing has its default where it is read.
+// Keys of all events; where one is missing, its reader takes a default.
 constexpr Field kEventFields[] = {{"event", Kind::text},
                                   {"iteration", Kind::whole},
                                   {"seconds", Kind::number},
@@ -168,7 +168,7 @@ std::vector<EventJson> read_events(const std::filesystem::path& path) {
         ++number;
         const Checker checker(fmt::format("{}, line {}", path.string(), number), kLogRemedy);
         EventJson event = EventJson::parse(line, nullptr, false);
-        if (event.is_discarded() && lines.eof()) break;  // cut off by a kill
+        if (event.is_discarded() && lines.eof()) break;  // cut off when the run was killed
         checker.event(event);
         events.push_back(std::move(event));
     }

@@ -1,5 +1,5 @@
-// run.jsonl and metrics.json of a run as they are read again, by --resume and by comparisons: what
-// is not as a run writes it is an error of input.
+// Reads the run.jsonl and metrics.json of a run again, for --resume and for comparisons. Content
+// that no run writes is an input error.
 #pragma once
 
 #include <filesystem>
@@ -8,9 +8,9 @@
 
 namespace darb {
 
-/// The events of a run.jsonl in their order; none where there is no such file. A last line that a
-/// kill cut off does not count. Throws Error naming file, line and key where a line is no event or
-/// a value is of another type.
+/// The events of a run.jsonl in order; none where the file does not exist. A last line that was cut
+/// off when the run was killed is ignored. Throws Error naming file, line and key where a line is
+/// not an event or a value has the wrong type.
 std::vector<nlohmann::json> read_events(const std::filesystem::path& path);
 
 /// Where a run ended.
@@ -19,10 +19,11 @@ struct RunEnd {
     bool interrupted = true;
 };
 
-/// Of a metrics.json. Throws Error naming file and key.
+/// Reads it from a metrics.json. Throws Error naming file and key.
 RunEnd read_run_end(const std::filesystem::path& path);
 
-/// The whole file, an object whose values that are read again are of their types. Throws Error.
+/// The whole metrics.json: an object in which the values that are read again have been checked for
+/// their types. Throws Error naming file and key.
 nlohmann::json read_metrics(const std::filesystem::path& path);
 
 }  // namespace darb

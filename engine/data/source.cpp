@@ -1,9 +1,9 @@
 #include "engine/data/source.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <fmt/format.h>
 #include <map>
 #include <optional>
 #include <set>
@@ -51,7 +51,7 @@ std::string with_slashes(std::string name) {
 
 std::string scaled_images(const fs::path& folder) {
     std::string first;
-    std::error_code none;  // no such folder: no entries
+    std::error_code none;  // a missing folder has no entries
     for (const fs::directory_entry& entry : fs::directory_iterator(folder, none)) {
         const std::string name = entry.path().filename().string();
         if (name.starts_with("images_") && entry.is_directory() && (first.empty() || name < first))
@@ -77,7 +77,7 @@ std::string lower_case(std::string text) {
 
 std::vector<fs::path> folders_of(const fs::path& parent) {
     std::vector<fs::path> folders;
-    std::error_code none;  // no such folder: no entries
+    std::error_code none;  // a missing folder has no entries
     for (const fs::directory_entry& entry : fs::directory_iterator(parent, none))
         if (entry.is_directory(none) && !entry.path().filename().string().starts_with('.'))
             folders.push_back(entry.path());
@@ -123,16 +123,16 @@ namespace {
 
 constexpr int kDefaultWidth = 1600;  // px; wider photos are scaled down unless asked for
 
-/// What happened to how many photos, for the notes.
+/// How many photos were changed in which way, for the notes.
 struct Tally {
     bool own_alpha = false;  // some photo has an alpha channel of its own
-    bool masked = false;     // some photo has a mask, or a gap after it was straightened
+    bool masked = false;     // some photo has a mask, or a gap from undistortion
     std::size_t resized = 0, unturned = 0, undistorted = 0, too_wide = 0, downscaled = 0;
-    std::size_t narrower = 0;  // photos, than the width that is asked for
+    std::size_t narrower = 0;  // photos narrower than the requested width
     std::string resize_example;
     std::size_t unfit = 0;  // photos that cannot be used, where only cameras are wanted
     std::string unfit_example;
-    std::size_t other_focal = 0;  // cameras whose focal length is not what EXIF says
+    std::size_t other_focal = 0;  // cameras whose focal length differs from EXIF
     std::string focal_example;
 };
 
@@ -141,17 +141,17 @@ bool same_aspect(const LensModel& lens, int width, int height) {
     return std::abs(height - wanted) <= 1.5 + 0.01 * wanted;
 }
 
-/// The EXIF number to apply; see load_photo.
+/// The EXIF orientation to apply; see load_photo.
 int choose_orientation(const ImageInfo& info, const LensModel& lens) {
     if (info.orientation < 5)
-        return 1;  // no change of size: cameras are calibrated on stored pixels
+        return 1;  // the size does not tell: cameras are calibrated on stored pixels
     if (info.width == lens.width && info.height == lens.height) return 1;
     if (info.height == lens.width && info.width == lens.height) return info.orientation;
     return same_aspect(lens, info.width, info.height) ? 1 : info.orientation;
 }
 
-/// EXIF's focal length against the camera's. Crops and digital zoom change it, so only what is far
-/// off is told; a fisheye's says little.
+/// Compares EXIF's focal length with the camera's. Crops and digital zoom change it, so only large
+/// differences are noted; that of a fisheye says little.
 void compare_focal(const ImageInfo& info, const View& view, Tally& tally) {
     constexpr double kFilmDiagonal = 43.27, kMost = 1.6;  // mm
     if (info.focal_35mm <= 0 || view.lens.parameters.empty() || view.lens.width < 1 ||
@@ -192,7 +192,8 @@ void fit_lens(View& view, Tally& tally) {
     view.lens = scale_lens(view.lens, width, height);
 }
 
-/// Where only cameras are wanted: a photo that is there has its say, one that cannot be used not.
+/// For when only cameras are wanted: an existing photo is taken into account, and one that cannot
+/// be used is ignored.
 void fit_lens_if_possible(View& view, Tally& tally) {
     if (!std::filesystem::is_regular_file(view.photo)) return;
     View fitted = view;
@@ -206,7 +207,7 @@ void fit_lens_if_possible(View& view, Tally& tally) {
     view = std::move(fitted);
 }
 
-/// The intrinsics of a picture of another size of what `full` sees.
+/// Sets the intrinsics for a picture of another size that shows what `full` sees.
 void set_size(const Camera& full, const PhotoSize& size, Camera& camera) {
     const double sx = static_cast<double>(size.width) / full.width;
     const double sy = static_cast<double>(size.height) / full.height;
@@ -298,7 +299,7 @@ PhotoSize size_at_resolution(int width, int height, int resolution) {
 
 namespace {
 
-// As the photo is, its lens taken off where the view's is.
+// The camera at the photo's full size, without the lens if the view's camera has none.
 Camera whole_camera(const View& view) {
     return view.camera.lens.active || !view.lens.distorted()
                ? pinhole_camera(view.lens)
@@ -307,7 +308,8 @@ Camera whole_camera(const View& view) {
 
 bool is_too_small(const Camera& whole, const Camera& now, double scale) {
     return scale != 1 &&
-           scale * now.width >= whole.width + 0.5 + 0.5 * scale;  // half a pixel of what it is now
+           scale * now.width >=
+               whole.width + 0.5 + 0.5 * scale;  // less than half a pixel more than it is now
 }
 
 }  // namespace
@@ -341,7 +343,7 @@ std::vector<View> scaled_views(std::vector<View> views, double scale) {
 
 void fit_views(Dataset& dataset, const DatasetOptions& options) {
     Tally tally;
-    // Many views share one lens: its frame is found once.
+    // Many views share one lens, so its frame is computed only once.
     std::map<std::pair<std::string, std::vector<double>>, UndistortedFrame> frames;
     for (View& view : dataset.views) {
         if (options.require_photos)
@@ -362,35 +364,37 @@ void fit_views(Dataset& dataset, const DatasetOptions& options) {
         if (view.lens.distorted() && !original) ++tally.undistorted;
         set_intrinsics(view, at->second, options.resolution, tally);
     }
-    // A masked pixel must never be trained as background. An alpha channel may be opaque
-    // throughout; where it is not, its transparent pixels are left out beside masked ones.
+    // A masked pixel must never be trained as background. Where a data set has both masks and an
+    // alpha channel with transparent pixels, these are left out as well.
     dataset.has_alpha = tally.own_alpha || tally.masked;
     dataset.alpha_is_mask = tally.masked;
     add_notes(tally, options, dataset);
 }
 
-// Cameras, and points, with which nothing good can come out. A few of many may be wrong: most are
-// noted, and cameras that stand far outside of the scene are left out.
+// Cameras and points that cannot give a good result. A few wrong ones among many are common: most
+// are noted, and cameras that stand far outside the scene are left out.
 
 namespace {
 
-constexpr double kLeastFocal = 0.05, kMostFocal = 50;  // of the larger side: 169 and 1.1 degrees
-constexpr double kMostAspect = 4;                      // of the focal lengths
-constexpr double kMostShift = 1;         // principal point beyond the frame, of its side
-constexpr std::size_t kFewPoints = 100;  // that may well be out of a good camera's view
+constexpr double kLeastFocal = 0.05,
+                 kMostFocal = 50;        // shares of the larger side: 169 and 1.1 degrees
+constexpr double kMostAspect = 4;        // ratio of the two focal lengths
+constexpr double kMostShift = 1;         // principal point beyond the frame, as a share of its side
+constexpr std::size_t kFewPoints = 100;  // so few may well be out of a good camera's view
 constexpr std::size_t kLooked = 20'000;  // points, evenly picked
 
-// A camera that stands this many times farther out than the others may be wrong. Where no points
-// tell what it sees, the limit is higher: an overview from far away is no mistake.
+// A camera that stands this many times farther out than the others may be wrong. The limit is
+// higher where no points tell what it sees: an overview from far away is not a mistake.
 constexpr double kFarWithPoints = 10, kFarWithoutPoints = 100;
-constexpr double kLeastCore = 2.0 / 3;    // share of the cameras that stand together
-constexpr double kShareOfDepth = 0.1;     // of the way to the points: how far apart cameras that
-                                          // stand in one place are taken to be, at least
-constexpr double kLeastSpread = 0.05;     // of the frame, that the points must take up
-constexpr std::size_t kLeastGroup = 3;    // cameras that are a second place, not mistakes
-constexpr std::size_t kNamedCameras = 3;  // photos that a note names
+constexpr double kLeastCore = 2.0 / 3;  // share of the cameras that stand together
+constexpr double kShareOfDepth = 0.1;  // share of the distance to the points: cameras that stand in
+                                       // one place are treated as at least this far apart
+constexpr double kLeastSpread = 0.05;  // share of the frame that the points must cover
+constexpr std::size_t kLeastGroup =
+    3;  // as many cameras elsewhere are a second place, not mistakes
+constexpr std::size_t kNamedCameras = 3;  // photos named in a note
 
-/// How many and the first of them.
+/// A number of views, and the first of them.
 struct Found {
     std::size_t count = 0;
     const View* example = nullptr;
@@ -412,8 +416,8 @@ bool has_odd_principal_point(const Camera& c) {
     return odd(c.cx, c.width) || odd(c.cy, c.height);
 }
 
-/// Whether a point is before it and in its frame, or half of that beside it; with a lens, before
-/// it.
+/// Whether a point is before the camera and in its frame, or beside it by up to half the frame;
+/// with a lens, whether one is before it.
 bool sees_a_point(const Camera& c, const PointCloud& points, std::size_t step) {
     for (std::size_t i = 0; i < points.size(); i += step) {
         const double* at = &points.position[3 * i];
@@ -452,8 +456,8 @@ std::vector<glm::dvec3> some_points(const PointCloud& points) {
     return some;
 }
 
-/// How much of the frame the points take up that a view sees: the middle 90 % of them, as a share
-/// of its longer side. Nothing where it sees hardly any.
+/// How much of the frame the visible points cover: the middle 90 % of them, as a share of the
+/// frame's longer side. Nothing where the view sees hardly any.
 std::optional<double> spread_in_frame(const View& view, const std::vector<glm::dvec3>& points) {
     const double side = std::max(view.lens.width, view.lens.height);
     const double focal = view.lens.parameters.empty() ? side : view.lens.parameters[0];
@@ -470,8 +474,8 @@ std::optional<double> spread_in_frame(const View& view, const std::vector<glm::d
     return std::max(middle(u, 0.95) - middle(u, 0.05), middle(v, 0.95) - middle(v, 0.05));
 }
 
-/// Whether this camera has company: cameras that stand about as close together as the core does,
-/// but not in one place. Drones above a street and a second room do; mistakes do not.
+/// Whether this camera has company: other cameras about as close together as those of the core, but
+/// not in one place. That holds for drones above a street or a second room, but not for mistakes.
 bool is_of_a_group(const std::vector<glm::dvec3>& centres, std::size_t i, double reach) {
     std::size_t near = 0;
     double farthest = 0;
@@ -484,8 +488,8 @@ bool is_of_a_group(const std::vector<glm::dvec3>& centres, std::size_t i, double
     return near >= kLeastGroup && farthest > 1e-6 * reach;
 }
 
-/// Which views stand far outside of the place where at least two thirds of them are, and how many
-/// times its radius (`times`, of the nearest of them).
+/// Which views stand far outside the place where at least two thirds of them are. `times`: how many
+/// radii of that place the nearest of them is away.
 std::vector<std::size_t> far_views(const Dataset& dataset, double& times) {
     const std::size_t count = dataset.views.size();
     if (count < 3) return {};
@@ -553,7 +557,7 @@ void leave_out_far_cameras(Dataset& dataset) {
 
 void note_coarse_points(Dataset& dataset) {
     const std::vector<double>& positions = dataset.points.position;
-    constexpr double kFar = 256;  // times its width, a cloud is from 0 where float32 may be coarse
+    constexpr double kFar = 256;  // a cloud this many widths from 0 may be coarse in float32
     if (positions.size() < 3 * kFewPoints || choose_origin(positions, kFar) == glm::dvec3(0.0))
         return;
     double step = 0;
@@ -566,7 +570,7 @@ void note_coarse_points(Dataset& dataset) {
     }
     std::vector<double> distance2 = neighbour_distance2(positions);
     const double distance = std::sqrt(nearest_rank(distance2, 0.5));
-    constexpr double kCoarsePoints = 0.1;  // of the distance to the next points
+    constexpr double kCoarsePoints = 0.1;  // share of the distance to the next points
     if (!(step > kCoarsePoints * distance)) return;
     dataset.notes.push_back(fmt::format(
         "Warning: the points lie in steps of {:.3g}, as float32 does so far from 0, and half of "

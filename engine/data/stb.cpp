@@ -1,5 +1,5 @@
-// The one translation unit that holds the code of stb_image_write. Pictures are read by other
-// libraries: photo_decoder.h.
+// The only translation unit with the code of stb_image_write. Pictures are read by other libraries:
+// see photo_decoder.h.
 #pragma GCC diagnostic ignored "-Wconversion"
 #pragma GCC diagnostic ignored "-Wshadow"
 #pragma GCC diagnostic ignored "-Wextra"

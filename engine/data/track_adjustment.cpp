@@ -18,13 +18,13 @@ namespace darb {
 namespace {
 
 constexpr int kMostSteps = 50, kMostGradients = 60;
-constexpr std::size_t kFewestObservations = 10;  // of a view that moves
-constexpr double kLeastGain = 0.5;               // of the median error
-constexpr double kEnough = 1e-5;                 // of the cost, a step
+constexpr std::size_t kFewestObservations = 10;  // a view with fewer does not move
+constexpr double kLeastGain = 0.5;  // the median error must fall to this share of itself
+constexpr double kEnough = 1e-5;    // stop where a step lowers the cost by less than this share
 
 using Six = std::array<PoseVector, 6>;
 
-Six inverse_of(const Six& a) {  // symmetric, positive definite: by Gauss and Jordan
+Six inverse_of(const Six& a) {  // symmetric, positive definite; by Gauss-Jordan elimination
     Six m = a, inverse{};
     for (std::size_t i = 0; i < 6; ++i) inverse[i][i] = 1;
     for (std::size_t i = 0; i < 6; ++i) {
@@ -54,11 +54,11 @@ double dot(const std::vector<PoseVector>& a, const std::vector<PoseVector>& b) {
     return sum;
 }
 
-struct Cross {  // J_camera^T J_point of an observation
+struct Cross {  // J_camera^T J_point for one observation
     std::array<glm::dvec3, 6> rows{};
 };
 
-// The equations of a step at one place.
+// The normal equations of one step.
 struct Normal {
     std::vector<Six> cameras;           // [view], damped
     std::vector<PoseVector> d_cameras;  // [view] -J^T r
@@ -130,7 +130,7 @@ class Adjustment {
         return errors.empty() ? 1 : nearest_rank(errors, 0.5);
     }
 
-    // Behind a camera a point costs what it did at 1,000 limits.
+    // A point behind a camera costs what an error of 1,000 limits would.
     double cost(const std::vector<Camera>& cameras, const std::vector<glm::dvec3>& points) const {
         double sum = 0;
         for (const TrackObservation& o : all_) {
@@ -182,7 +182,7 @@ class Adjustment {
         }
     }
 
-    // (U - W V^-1 W^T) x without the matrix; of x = 0 and d_points, -W V^-1 d_points.
+    // (U - W V^-1 W^T) x without forming the matrix; with x = 0 and d_points, -W V^-1 d_points.
     std::vector<PoseVector> through_points(const Normal& n, const std::vector<PoseVector>& x,
                                            bool of_points) const {
         std::vector<PoseVector> y(x.size());
@@ -254,7 +254,7 @@ class Adjustment {
     std::vector<Camera> cameras_;
     std::vector<glm::dvec3> points_;
     std::vector<bool> moves_, tracked_;
-    double limit_px_ = 1;  // of Huber's loss
+    double limit_px_ = 1;  // where Huber's loss becomes linear
 };
 
 }  // namespace
@@ -299,7 +299,7 @@ TrackAdjustment adjust_to_tracks(Dataset& dataset) {
 
 namespace {
 
-// Lenses by what they are made of: photos share them.
+// Caches lenses by their model and parameters, because photos share them.
 class Lenses {
   public:
     const Lens& of(const LensModel& model) {

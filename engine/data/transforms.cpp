@@ -1,10 +1,10 @@
 #include "engine/data/transforms.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -30,7 +30,7 @@ namespace {
 
 constexpr const char* kCorrectEntry = "Correct the entry, or export the file again.";
 
-/// Some writers put numbers into strings.
+/// Reads a number, which some writers put into a string.
 double to_number(const json& value, const char* key, const std::string& where) {
     if (value.is_number()) return value.get<double>();
     const std::string text = value.is_string() ? value.get<std::string>() : "";
@@ -54,7 +54,7 @@ std::string read_string(const json& object, const char* key, const std::string& 
     return at->get<std::string>();
 }
 
-/// Writers put 0 and 1 for false and true.
+/// Reads a truth value, for which some writers put 0 or 1.
 bool read_bool(const json& object, const char* key, const std::string& where, bool absent) {
     const auto at = object.find(key);
     if (at == object.end() || at->is_null()) return absent;
@@ -63,7 +63,7 @@ bool read_bool(const json& object, const char* key, const std::string& where, bo
     throw Error(where, fmt::format("{} is neither true or false nor a number", key), kCorrectEntry);
 }
 
-/// instant-ngp's x_fov and y_fov, degrees, which outrank its other keys there.
+/// instant-ngp's x_fov and y_fov, in degrees, which take precedence over its other keys.
 void read_fields_of_view(const json& object, const std::string& where, TransformsIntrinsics& to) {
     constexpr double kRadian = 0.017453292519943295;
     std::optional<double> x, y;
@@ -98,9 +98,9 @@ void read_distortion_list(const json& object, const std::string& where, Transfor
     to.p2 = values[5];
 }
 
-/// Keys that are absent leave what is there: the file's values are the frames' defaults.
+/// Absent keys leave values unchanged: those of the file are the defaults of the frames.
 void read_intrinsics(const json& object, const std::string& where, TransformsIntrinsics& to) {
-    // A frame's own focal length or angle outranks the file's.
+    // A frame's own focal length or angle takes precedence over the file's.
     const auto own = [&](const char* key) {
         const auto at = object.find(key);
         return at != object.end() && !at->is_null();
@@ -168,13 +168,13 @@ CameraToWorld read_matrix(const json& object, const char* key, const std::string
     return pose;
 }
 
-/// What is told of all frames together.
+/// What is noted once for all frames.
 struct PoseTally {
     std::size_t scaled = 0, halfway = 0, moving = 0;
     bool mitsuba = false;  // the file's camera axes: x to the left, y up, z forwards
 };
 
-/// The pose of the file's frame, its axes those of COLMAP.
+/// A pose in the file's frame, with COLMAP's camera axes.
 CameraToWorld read_camera_to_world(const json& object, const char* key, const std::string& where,
                                    PoseTally& tally) {
     CameraToWorld pose = read_matrix(object, key, where);
@@ -186,8 +186,8 @@ CameraToWorld read_camera_to_world(const json& object, const char* key, const st
     return pose;
 }
 
-/// transform_matrix or, where only the poses at the start and the end of an exposure are there, the
-/// one halfway.
+/// Reads transform_matrix or, where only the poses at the start and the end of an exposure are
+/// given, the pose halfway.
 void read_pose(const json& object, const std::string& where, PoseTally& tally,
                TransformsFrame& frame) {
     constexpr const char *kStart = "transform_matrix_start", *kEnd = "transform_matrix_end";
@@ -211,7 +211,7 @@ void read_pose(const json& object, const std::string& where, PoseTally& tally,
     frame.translation = -(frame.rotation * pose.centre);
 }
 
-/// COLMAP's name of a nerfstudio or instant-ngp camera.
+/// COLMAP's name for a nerfstudio or instant-ngp camera model.
 std::string model_name(const TransformsIntrinsics& in, const std::string& where) {
     std::string name = in.camera_model;
     std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::toupper(c); });
@@ -229,7 +229,8 @@ std::string model_name(const TransformsIntrinsics& in, const std::string& where)
                                                  "PINHOLE", "SIMPLE_PINHOLE"};
     for (const std::string_view known : kPerspective) {
         if (name != known) continue;
-        // COLMAP's k4 to k6 stand in the denominator; nerfstudio's k4 is the numerator's r^8.
+        // COLMAP's k4 to k6 are in the denominator; nerfstudio's k4 is the coefficient of r^8 in
+        // the numerator.
         const bool rational = name == "FULL_OPENCV" || in.k[4] != 0 || in.k[5] != 0;
         if (in.k[3] != 0 && !rational) return std::string(kFourRadial);
         if (in.k[2] != 0 || in.k[3] != 0 || in.k[4] != 0 || in.k[5] != 0) return "FULL_OPENCV";
@@ -241,7 +242,7 @@ std::string model_name(const TransformsIntrinsics& in, const std::string& where)
 }
 
 /// Keys that are read, and keys that change nothing here: bounding boxes and frames of other
-/// programs, what the writer did already, names, times of day.
+/// programs, what the writer has applied already, names, times of day.
 constexpr std::string_view kReadKeys[] = {"frames",
                                           "w",
                                           "h",
@@ -303,7 +304,7 @@ constexpr std::string_view kHarmlessKeys[] = {"aabb",
 struct MeaningfulKey {
     std::string_view key, instead;
 };
-/// Keys that are known and not read, and what is done in place of what they say.
+/// Known keys that are not supported, and what happens in place of what they ask for.
 constexpr MeaningfulKey kUnreadKeys[] = {
     {"rolling_shutter", "each photo is taken for exposed at one moment"},
     {"motionblur_amount", "each photo is taken for exposed at one moment"},
@@ -321,11 +322,11 @@ constexpr MeaningfulKey kUnreadKeys[] = {
     {"s4", "the distortion is read without it"},
     {"p3", "the distortion is read without it"},
     {"p4", "the distortion is read without it"}};
-/// Lenses that a pinhole with distortion cannot stand in for.
+/// Lenses that a pinhole with distortion cannot replace.
 constexpr std::string_view kOtherLenses[] = {"ftheta_p0", "latlong", "equirectangular",
                                              "is_equirectangular", "lens_latlong"};
 
-/// Whether a value says something: not false, 0, null or empty.
+/// Whether a value carries information: it is not false, 0, null or empty.
 bool says_something(const json& value) {
     if (value.is_boolean()) return value.get<bool>();
     if (value.is_number()) return value.get<double>() != 0;
@@ -334,7 +335,7 @@ bool says_something(const json& value) {
     return !value.is_null() && !(value.is_string() && value.get<std::string>().empty());
 }
 
-/// In lower case, without what joins words.
+/// The key in lower case, without the characters that join words.
 std::string letters_of(std::string_view key) {
     std::string letters;
     for (const char c : key)
@@ -343,7 +344,7 @@ std::string letters_of(std::string_view key) {
     return letters;
 }
 
-/// Letters to add, drop or change that make one word of the other (Levenshtein).
+/// Levenshtein distance: letters to add, drop or change to turn one word into the other.
 std::size_t edits_between(const std::string& a, const std::string& b) {
     std::vector<std::size_t> row(b.size() + 1);
     for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -358,7 +359,7 @@ std::size_t edits_between(const std::string& a, const std::string& b) {
     return row[b.size()];
 }
 
-/// The key that is read and that this one may have been meant for; empty where there is none.
+/// The supported key that this one may be a misspelling of; empty where there is none.
 std::string_view near_miss_of(std::string_view key) {
     const std::string letters = letters_of(key);
     for (const std::string_view known : kReadKeys) {
@@ -369,7 +370,7 @@ std::string_view near_miss_of(std::string_view key) {
     return {};
 }
 
-/// Whether an unknown key speaks of what a data set is made of.
+/// Whether an unknown key sounds as if it mattered to a data set.
 bool sounds_meaningful(std::string_view key) {
     constexpr std::string_view kWords[] = {"mask", "depth",   "alpha", "distort",   "shutter",
                                            "fov",  "fisheye", "focal", "intrinsic", "extrinsic"};
@@ -378,7 +379,7 @@ bool sounds_meaningful(std::string_view key) {
         kWords, [&](std::string_view word) { return letters.find(word) != std::string::npos; });
 }
 
-/// Collects the keys of the file and its frames that are not read though they may matter.
+/// Collects keys of the file and its frames that are not read although they may matter.
 class UnreadKeys {
   public:
     void look_at(const json& object, const std::string& where) {
@@ -396,7 +397,7 @@ class UnreadKeys {
         }
     }
 
-    /// A sentence, or nothing.
+    /// A sentence about them, or nothing.
     std::string note(const std::string& where) const {
         std::string list;
         for (const auto& [key, why] : found_)
@@ -422,13 +423,13 @@ class UnreadKeys {
     std::map<std::string, std::string> found_;
 };
 
-/// Metres a step of the depths, as either dialect says it.
+/// Reads the depth unit, metres a step, as either program writes it.
 void read_depth_unit(const json& root, const std::string& where, TransformsFile& file) {
     constexpr const char *kAll = "depth_unit_scale_factor", *kIntegers = "integer_depth_scale";
     std::optional<double> all, integers;
     read_number(root, kAll, where, all);
     read_number(root, kIntegers, where, integers);
-    if (integers && !(*integers > 0)) integers.reset();  // instant-ngp's word for none
+    if (integers && !(*integers > 0)) integers.reset();  // instant-ngp writes 0 for none
     if (all && integers && *all != *integers)
         throw Error(where,
                     fmt::format("{} is {:g}, but {} is {:g}", kAll, *all, kIntegers, *integers),
@@ -463,7 +464,7 @@ void read_split(const json& root, TransformsFile& file) {
     read("val_filenames", file.test_filenames);
 }
 
-/// The depth of a frame by either of its names.
+/// The depth file of a frame, by either of its keys.
 std::string read_depth_path(const json& frame, const std::string& where) {
     const std::string nerfstudio = read_string(frame, "depth_file_path", where);
     const std::string ngp = read_string(frame, "depth_path", where);
@@ -474,7 +475,7 @@ std::string read_depth_path(const json& frame, const std::string& where) {
     return nerfstudio.empty() ? ngp : nerfstudio;
 }
 
-/// Frames whose focal length in pixels and whose angle differ by more than rounding.
+/// Whether focal length in pixels and angle differ by more than rounding.
 bool angles_disagree(const TransformsIntrinsics& in) {
     constexpr double kMost = 0.02;
     const auto off = [](std::optional<double> focal, std::optional<double> angle,
@@ -485,7 +486,7 @@ bool angles_disagree(const TransformsIntrinsics& in) {
     return off(in.fl_x, in.camera_angle_x, in.w) || off(in.fl_y, in.camera_angle_y, in.h);
 }
 
-/// What is told of the frames together.
+/// What is noted once for all frames.
 struct FrameTally {
     PoseTally poses;
     std::set<double> times;
@@ -618,9 +619,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kSyntheticSize = 800;  // px, of NeRF synthetic; only where no photo tells
+constexpr int kSyntheticSize = 800;  // px, as in NeRF synthetic; only where no photo tells
 
-// Of the sparse points where ply_file_path is absent: of 3DGS, BlenderNeRF and nerfstudio.
+// Names of the sparse points where ply_file_path is absent, from 3DGS, BlenderNeRF and nerfstudio.
 constexpr const char* kPointFiles[] = {"points3d.ply", "points3D.ply", "sparse_pc.ply",
                                        "pointcloud.ply"};
 
@@ -629,7 +630,7 @@ std::string plain_name(const std::string& file_path) {
     return fs::path(with_slashes(file_path)).lexically_normal().generic_string();
 }
 
-/// With images/ replaced by the folder that the options ask for.
+/// The name with images/ replaced by the folder that the options ask for.
 std::string asked_name(const std::string& name, const DatasetOptions& options) {
     if (options.images_folder != "images" && name.starts_with(kImages))
         return options.images_folder + "/" + name.substr(kImages.size());
@@ -640,7 +641,7 @@ bool in_pixels(const TransformsIntrinsics& in) {
     return in.fl_x || in.fl_y || in.cx || in.cy;
 }
 
-/// The lens; a file without a size takes that of its own photo, turned, whichever is loaded.
+/// Sets the lens; where the file states no size, that of the photo is taken, as turned.
 void set_lens(const TransformsFrame& frame, const fs::path& listing, const DatasetOptions& options,
               View& view) {
     const std::string where = fmt::format("{} ({})", listing.string(), frame.file_path);
@@ -680,22 +681,22 @@ void set_depth(const TransformsFrame& frame, const TransformsFile& declared, con
 struct Skipped {
     std::size_t count = 0;
     std::string first;
-    std::size_t in_images = 0;  // of all frames, those under images/
+    std::size_t in_images = 0;  // over all frames: those in images/
 };
 
-/// What the files declare beside frames.
+/// What the files declare besides frames.
 struct Declared {
     std::string ply;
-    bool masks = false;  // of some frame
+    bool masks = false;  // some frame has a mask
     bool depths = false;
-    bool no_depths = false;  // they are not to be read
+    bool no_depths = false;  // depths are declared, but must not be read
     std::size_t scaled_poses = 0;
-    std::map<fs::path, std::string> by_end;  // photos found by the end of these names
-    std::size_t of_no_split = 0;             // frames that the split leaves out
-    std::size_t unknown_names = 0;           // of the split, which no frame has
+    std::map<fs::path, std::string> by_end;  // photos that were found by the ends of these names
+    std::size_t of_no_split = 0;             // frames that are in neither part of the split
+    std::size_t unknown_names = 0;           // names in the split that no frame has
 };
 
-/// By the end of its name, beside the file or in its folder of images.
+/// Finds a photo by the end of its name, beside the file or in its images folder.
 fs::path find_frame_by_end(const fs::path& root, const std::string& name, Declared& declared) {
     fs::path photo = find_by_end(root, name);
     if (photo.empty()) photo = find_by_end(root / kImages, "/" + name);
@@ -720,7 +721,7 @@ std::set<std::string> names_of_split(const std::vector<std::string>& listed,
     return names;
 }
 
-/// What the split and the poses of the files were found to be.
+/// Notes what was found about the split and the poses of the files.
 void note_declared(const Declared& declared, Dataset& dataset) {
     if (declared.scaled_poses > 0)
         dataset.notes.push_back(fmt::format("The scale of the rotation was removed: {}.",
@@ -770,12 +771,12 @@ void add_frames(const fs::path& listing, bool is_test, const DatasetOptions& opt
         const std::string name = asked_name(view.name, options);
         const fs::path wanted = root / name;
         view.photo = find_photo(root, name);
-        if (view.photo.empty() && name == view.name)  // backslashes that are part of a name
+        if (view.photo.empty() && name == view.name)  // the backslashes are part of the name
             view.photo = find_photo(root, frame.file_path);
         if (view.photo.empty()) view.photo = find_frame_by_end(root, name, declared);
         if (view.photo.empty()) {
             if (options.require_photos) {
-                check_is_file(wanted);  // what is there is of another kind
+                check_is_file(wanted);  // throws where something else than a file is there
                 if (skipped.count++ == 0) skipped.first = wanted.string();
                 continue;
             }
@@ -810,7 +811,7 @@ void add_points(const fs::path& root, const std::string& ply, const DatasetOptio
     for (const char* name : kPointFiles)
         if (ply.empty() && !fs::is_regular_file(path)) path = root / name;
     if (!fs::is_regular_file(path)) {
-        if (options.require_photos && !ply.empty())  // else only cameras are wanted
+        if (options.require_photos && !ply.empty())  // otherwise only cameras are wanted
             dataset.notes.push_back(fmt::format("The point cloud {} is missing.", path.string()));
         return;
     }
@@ -875,7 +876,7 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
     note_declared(declared, dataset);
     if (!declared.masks) add_masks(dataset.root, options, dataset);
     if (!declared.depths && !declared.no_depths) {
-        const fs::path& photo = dataset.views[0].photo;  // in images/ or in the like of it
+        const fs::path& photo = dataset.views[0].photo;  // in images/, or a folder in its place
         add_depths(dataset.root, photo.parent_path(), options, dataset);
     }
     add_points(dataset.root, declared.ply, options, dataset);

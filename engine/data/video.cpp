@@ -39,12 +39,12 @@ void need_ffmpeg(const fs::path& video) {
                                 shell_quoted(video)));
 }
 
-// A file for what ffmpeg complains of, gone with it.
+// A temporary file for ffmpeg's complaints, deleted with this object.
 class LogFile {
   public:
     LogFile() {
         std::string name = (fs::temp_directory_path() / "darb_ffmpeg_XXXXXX").string();
-        const int file = ::mkstemp(name.data());  // of this name nothing was there
+        const int file = ::mkstemp(name.data());  // mkstemp makes a file that did not exist
         if (file < 0)
             throw Error(name, "cannot be made", "Free space in the folder of temporary files.");
         ::close(file);
@@ -70,8 +70,8 @@ class LogFile {
     fs::path path_;
 };
 
-// An expression of ffmpeg's that is not 0 for these pictures. In groups, as it takes no sum of more
-// than about a hundred.
+// An ffmpeg expression that is not 0 for these pictures. It consists of groups, because ffmpeg
+// accepts no sum with more than about a hundred terms.
 std::string selection(const std::vector<std::size_t>& pictures) {
     constexpr std::size_t kGroup = 50;
     std::string text;
@@ -82,7 +82,7 @@ std::string selection(const std::vector<std::size_t>& pictures) {
     return text + ")";
 }
 
-// What ffmpeg said, and what to do about the two commonest causes.
+// Throws with what ffmpeg said, and with what to do about the two most common causes.
 [[noreturn]] void ffmpeg_failed(const fs::path& video, const LogFile& log) {
     std::string said = "\n" + log.text();
     const auto says = [&](const char* part) { return said.find(part) != std::string::npos; };
@@ -97,7 +97,7 @@ std::string selection(const std::vector<std::size_t>& pictures) {
                 hint);
 }
 
-// Of the ffmpeg that is installed.
+// The option of the installed ffmpeg.
 std::string every_picture() {
     const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
     std::unique_ptr<std::FILE, decltype(close)> pipe(
@@ -118,7 +118,7 @@ std::string picture_pattern(const fs::path& folder, const std::string& name) {
 }
 
 std::string every_picture_option(std::string_view help) {
-    // At the beginning of a line: that of -vsync may tell one to use -fps_mode.
+    // Must stand at the beginning of a line: the help for -vsync may mention -fps_mode.
     const auto lists = [&](const std::string& option) {
         return help.starts_with(option) || help.find("\n" + option) != std::string_view::npos;
     };

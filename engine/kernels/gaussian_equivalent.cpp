@@ -21,7 +21,8 @@ GaussianEquivalent gaussian_equivalent_of(const std::function<double(double)>& p
     const auto overlap = [&](double c) {
         return integral([&](double q, double w) { return w * std::exp(-q / (2 * c)); });
     };
-    const auto excess = [&](double c) {  // of c over the root; rises through 0 there
+    const auto excess = [&](double c) {  // has the sign of c minus the root, and rises through 0
+                                         // there
         const double j =
             integral([&](double q, double w) { return w * q * std::exp(-q / (2 * c)); });
         return (keep_opacity ? c * c : c * overlap(c)) - j;

@@ -6,13 +6,13 @@
 namespace darb {
 
 struct GaussianEquivalent {
-    double covariance;  // multiplies the covariance of the splat, the footprint's scale included
-    double opacity;     // multiplies the opacity; 1 where it is kept
+    double covariance;  // factor on the splat's covariance; includes the footprint's scale
+    double opacity;     // factor on the opacity; 1 where that is kept
     double error;       // relative L2 distance of the two profiles over the image plane
 };
 
 /// Least squares over the plane between the rendered profile and opacity * exp(-q/(2c)). Keeping
-/// the opacity keeps the order of visibility; freeing it comes nearer.
+/// the opacity preserves the order of visibility; freeing it gives a closer fit.
 GaussianEquivalent gaussian_equivalent(int kernel, Footprint footprint, bool keep_opacity);
 
 }  // namespace darb

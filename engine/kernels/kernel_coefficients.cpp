@@ -1,8 +1,8 @@
 #include "engine/kernels/kernel_coefficients.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -18,9 +18,9 @@ namespace {
 
 constexpr int kFitNodes = 64;
 constexpr double kFullAccuracy = 1.2e-7;   // the spacing of float32 above 1
-constexpr double kSlopeShare = 0.25;       // a slope error counts this much of a value error
-constexpr double kPlainSlopeShare = 0.01;  // where the polynomial is the kernel, slope included
-// A device must not be told from a wrong one by what rounding leaves of terms that cancel.
+constexpr double kSlopeShare = 0.25;       // weight of a slope error relative to a value error
+constexpr double kPlainSlopeShare = 0.01;  // that weight where the polynomial is the kernel
+// Rounding that is left by terms that cancel must not make a device look wrong.
 constexpr double kMostSumOfTerms = 100;
 
 /// Chebyshev nodes of (from, to).
@@ -39,7 +39,7 @@ std::vector<double> powers(double x, int first, int degree, double scale = 1) {
     return row;
 }
 
-/// Rounded to float, because the shaders have floats: errors are then measured with them.
+/// Rounds coefficients to float, as the shaders store them, so that errors are measured with these.
 void take(KernelCoefficients& k, int first, const std::vector<double>& c) {
     for (std::size_t i = 0; i < c.size(); ++i)
         k.c[static_cast<std::size_t>(first) + i] = static_cast<float>(c[i]);
@@ -82,7 +82,7 @@ void fit_gaussian(KernelCoefficients& k) {
     take(k, 1, minimax_fit(rows, exact));
 }
 
-/// The exact footprints of evaluate_quadric, with value(0) = 1.
+/// The exact footprints for evaluate_quadric, with value(0) = 1.
 void fit_quadric(const DerivedKernel& kernel, KernelCoefficients& k) {
     const bool quadratic = k.half_power == 2;
     const double least = 1 / std::sqrt(1 + k.support);  // x at q = 0
@@ -105,7 +105,7 @@ void measure(const DerivedKernel& kernel, Footprint footprint, KernelCoefficient
     constexpr int kSamples = 1000;
     const bool gaussian = !std::isfinite(k.support);
     const double end = gaussian ? 16 : k.support;
-    KernelCoefficients drawn = k;  // of an exponential what 2^f alone strays
+    KernelCoefficients drawn = k;  // for an exponential, so that only the error of 2^f is measured
     if (gaussian) drawn.form = KERNEL_FORM_GAUSSIAN;
     for (int i = 0; i < kSamples; ++i) {
         const double q = end * i / kSamples;
@@ -159,7 +159,8 @@ KernelCoefficients fit_literal(const DerivedKernel& kernel, Footprint footprint,
     return k;
 }
 
-/// The better of x = t and x = t^2; kernels of d^4 (cosines of q) gain two degrees by the latter.
+/// The better one of x = t and x = t^2; kernels of d^4 (cosines of q) gain two degrees from the
+/// latter.
 KernelCoefficients fit_degree(const DerivedKernel& kernel, Footprint footprint, int degree) {
     KernelCoefficients plain = fit_literal(kernel, footprint, degree, false);
     if (plain.form != KERNEL_FORM_COMPACT || footprint == Footprint::exact) return plain;
@@ -174,7 +175,7 @@ double sum_of_terms(const KernelCoefficients& k) {
     return sum;
 }
 
-/// A negative w is below every cut-off, so it may be: see KernelProfile::given.
+/// A negative w is allowed, because it is below every cut-off: see KernelProfile::given.
 template <class Fit>
 KernelCoefficients best_of_degrees(const Fit& fit) {
     KernelCoefficients best = fit(kLeastDegree);
@@ -229,7 +230,8 @@ const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, i
 namespace {
 
 constexpr int kIterations = 30;
-using Matrix = std::vector<std::vector<long double>>;  // the normal equations square the condition
+using Matrix = std::vector<std::vector<long double>>;  // long double, because the normal equations
+                                                       // square the condition number
 
 std::vector<double> solve(Matrix m, std::vector<long double> b) {
     const std::size_t n = b.size();

@@ -13,43 +13,45 @@
 
 namespace darb {
 
-/// Degrees that can be asked for. kFullDegree means full accuracy: the shortest polynomial, at most
-/// KERNEL_MAX_DEGREE, whose error is below float32 rounding. The others are taken literally.
+/// Degrees that can be requested. kFullDegree means full accuracy: the shortest polynomial, of at
+/// most KERNEL_MAX_DEGREE, whose error is below float32 rounding. Other degrees are taken
+/// literally.
 constexpr int kFullDegree = 5, kLeastDegree = 2;
 constexpr double kShortAccuracy = 1e-2;
 
 struct KernelCoefficients {
     int form = KERNEL_FORM_COMPACT;
     int degree = 0;
-    bool modulus_of_sinc = false;  // rings; else raised cosine
+    bool modulus_of_sinc = false;  // rings: of sinc; else of raised cosine
     int half_power = 0;            // compact: 2a of u^a; quadric: 2e of (1+q)^-e, 1 or 2
     bool squared = false;          // x = t^2 rather than t; compact only
     bool line_integral = false;    // the exact footprint; quadric only
     double support = 0;            // R^2
-    double exponent = 0;           // of a kernel with shapes: that of shape 0
+    double exponent = 0;           // that of shape 0, for kernels with shapes
     double inverse_support = 0;    // 1/R^2 as the shaders have it: rounded up to float, so that the
                                    // edge q = R^2 gives u <= 0 with fused and unfused arithmetic
-    // of the polynomial, rising powers; rings: q of the peak and of the end of each pulse
+    // The polynomial's coefficients, rising powers. For rings: q at the peak and the end of each
+    // pulse.
     std::array<double, KERNEL_MAX_DEGREE + 1> c{};
-    double least_value = 0;  // smallest w, or 0: the shaders do not clamp it
-    double value_error = 0;  // largest, of the fit in double; gaussian: relative
+    double least_value = 0;  // smallest w where the shaders need not clamp it, or 0
+    double value_error = 0;  // largest error of the fit in double; gaussian: relative
     double slope_error = 0;  // largest error of dw/dt (gaussian: dw/dq), t = q/R^2
 };
 
-/// degree: kLeastDegree..kFullDegree; without meaning for rings, which are no polynomial. value(0)
-/// is 1 and the edge of the kernels that fall to zero
-/// is exactly zero at every degree. Costs milliseconds; kernel_coefficients keeps its results.
-/// Of a kernel that was given (KernelProfile::given) full accuracy is the best that there is, and
-/// other degrees are the least from there on that are within kShortAccuracy.
+/// degree: kLeastDegree..kFullDegree; ignored for rings, which are not polynomials. At every
+/// degree, value(0) is 1, and kernels that fall to zero are exactly zero at the edge. For a kernel
+/// given by a definition (KernelProfile::given), full accuracy is the best that can be reached, and
+/// a lower degree is raised until the error is within kShortAccuracy. Takes milliseconds;
+/// kernel_coefficients caches the results.
 KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree);
-/// The best polynomial in x = t with regard to float32, compact kernels only.
+/// The polynomial in x = t that is best in float32; compact kernels only.
 KernelCoefficients fit_plain(const DerivedKernel& kernel, Footprint footprint);
 const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, int degree);
 
-/// Absolute, of w, that float32 on any device may add to value_error. Multiplications and additions
-/// are rounded correctly: 3e-7. Division is not, nor is a square root: Vulkan allows 2.5 ulp, 2 for
-/// inversesqrt, and for sqrt both of them, so 7 for 1/sqrt(1+q), each 6e-8 below w = 1. Terms that
-/// cancel leave the rounding of the largest: built-in kernels have none.
+/// The absolute error of w that float32 on any device may add to value_error. Multiplications and
+/// additions are rounded correctly: 3e-7. Divisions and square roots are not: Vulkan allows 2.5 ulp
+/// for a division, 2 for inversesqrt, and both for sqrt, so 7 for 1/sqrt(1+q), each 6e-8 below w =
+/// 1. Terms that cancel leave the rounding of the largest; built-in kernels have none.
 inline double float_rounding(const KernelCoefficients& k) {
     if (k.form == KERNEL_FORM_BETA) return beta_kernel().rounding(k.exponent);
     if (k.form == KERNEL_FORM_EXPONENTIAL) return exponential_kernel().rounding(k.exponent);
@@ -61,11 +63,11 @@ inline double float_rounding(const KernelCoefficients& k) {
     return std::max(3e-7, 6e-8 * terms) + (divides || has_root ? 6e-7 : 0);
 }
 
-/// w and dw/dq as the shaders compute them with EVALUATION_POLYNOMIAL.
+/// w and dw/dq, as the shaders compute them with EVALUATION_POLYNOMIAL.
 template <class Real>
 void evaluate(const KernelCoefficients& k, Real q, Real& w, Real& slope);
 
-/// P and dP/dx by Horner.
+/// P and dP/dx by Horner's scheme.
 template <class Real>
 void evaluate_polynomial(const KernelCoefficients& k, Real x, Real& p, Real& dp) {
     p = static_cast<Real>(k.c[static_cast<std::size_t>(k.degree)]);
@@ -105,7 +107,7 @@ void evaluate_gaussian(const KernelCoefficients& k, Real q, Real& w, Real& slope
                          : Real(-0.5) * w;
 }
 
-/// 2^y of the polynomial, as the shaders have it.
+/// 2^y by the shaders' polynomial.
 template <class Real>
 Real power_of_two(const KernelCoefficients& k, Real y) {
     const Real above = std::max(y, Real(-126)), n = std::nearbyint(above);
@@ -114,7 +116,7 @@ Real power_of_two(const KernelCoefficients& k, Real y) {
     return std::ldexp(p, static_cast<int>(n));
 }
 
-/// As shaders/kernels/exponential.glsl but for its logarithm.
+/// As shaders/kernels/exponential.glsl, except for its logarithm.
 template <class Real>
 void evaluate_exponential(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
     const Real half = Real(0.5) * static_cast<Real>(k.exponent);
@@ -125,7 +127,7 @@ void evaluate_exponential(const KernelCoefficients& k, Real q, Real& w, Real& sl
     slope = Real(-0.5) * half * p / v * w;
 }
 
-/// u^e = 2^(e log2 u), as shaders/kernels/beta.glsl but for its logarithm.
+/// u^e = 2^(e log2 u), as shaders/kernels/beta.glsl, except for its logarithm.
 template <class Real>
 void evaluate_beta(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
     const Real t = std::min(q * static_cast<Real>(k.inverse_support), Real(1)), u = 1 - t;
@@ -156,7 +158,7 @@ void evaluate_quadric(const KernelCoefficients& k, Real q, Real& w, Real& slope)
         const Real inverse_support = static_cast<Real>(k.inverse_support);
         const Real r = 1 / std::sqrt(v * scale), x = v * scale * r;
         const Real u = inside ? (support - q) * inverse_support : Real(1);
-        const Real dx = Real(0.5) * scale * r, dr = -dx * r * r;  // by q
+        const Real dx = Real(0.5) * scale * r, dr = -dx * r * r;  // derivatives by q
         Real p, dp;
         evaluate_polynomial(k, quadratic ? x : r - 2, p, dp);
         if (quadratic) {
@@ -173,7 +175,7 @@ void evaluate_quadric(const KernelCoefficients& k, Real q, Real& w, Real& slope)
     slope = inside ? slope : Real(0);
 }
 
-/// More than one pulse of 1/2 + 1/2 cos x or |sin x / x|, x = pi sqrt(q / c1), c1 the first zero.
+/// Several pulses of 1/2 + 1/2 cos x or |sin x / x|, with x = pi sqrt(q / c1), c1 the first zero.
 template <class Real>
 void evaluate_rings(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
     const bool inside = q < static_cast<Real>(k.support);
@@ -184,8 +186,8 @@ void evaluate_rings(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
         slope = Real(-0.25) * std::sin(x) / x * factor;
     } else {
         w = std::sin(x) / x;
-        slope = (std::cos(x) - w) / (2 * s);  // of w by s
-        if (s < Real(1)) {                    // where that cancels, its series
+        slope = (std::cos(x) - w) / (2 * s);  // derivative of w by s
+        if (s < Real(1)) {                    // its series, where that cancels
             slope = 0;
             Real term = Real(-1) / 6;
             for (int n = 1; n <= 9; ++n) {
@@ -220,7 +222,7 @@ void evaluate(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
     }
 }
 
-// Linear fits with the least largest error, for the polynomials of the shaders.
+// Linear fits that minimise the largest error, for the shaders' polynomials.
 
 /// Rows of a linear model: row i says sum_k basis[i][k] c[k] = target[i].
 struct LinearRows {
@@ -232,12 +234,12 @@ struct LinearRows {
     }
 };
 
-/// The c [unknowns] of least sum of squares; for a well-conditioned basis.
+/// The c [unknowns] with the least sum of squared errors; for a well-conditioned basis.
 std::vector<double> least_squares_fit(const LinearRows& fitted);
 
-/// The c [unknowns] of least max_i |error of fitted row i|, the exact rows holding exactly.
-/// Lawson's iteratively reweighted least squares. Needs fitted rows, and more unknowns than exact
-/// rows. Sized for polynomials: some 10 unknowns, some 100 rows.
+/// The c [unknowns] with the least max_i |error of fitted row i|, where the exact rows hold
+/// exactly. Lawson's iteratively reweighted least squares. Needs fitted rows, and more unknowns
+/// than exact rows. Meant for polynomials: some 10 unknowns and 100 rows.
 std::vector<double> minimax_fit(const LinearRows& fitted, const LinearRows& exact);
 
 }  // namespace darb

@@ -16,11 +16,11 @@ namespace darb {
 namespace {
 
 constexpr int kSeriesNodes = static_cast<int>(kMostSeriesTerms), kGrid = 2048;
-constexpr double kRounding = 1e-9;  // of an expression in double that cancels
+constexpr double kRounding = 1e-9;  // rounding of an expression in double with cancellation
 constexpr double kSameProfile = 1e-12;
-constexpr double kZeroAtEdge = 1e-6;  // a value of w / u^k at the edge below this is none
-// Of the shaders' polynomial in double and of its evaluation in float32: what darb check tells from
-// a device that computes wrongly.
+constexpr double kZeroAtEdge = 1e-6;  // a smaller value of w / u^k at the edge counts as 0
+// The largest error of the shaders' polynomial at which darb check can tell it from a device that
+// computes wrongly: that of its fit in double plus that of its evaluation in float32.
 constexpr double kFaithful = 4.8e-7;
 
 std::string in_words(double number) {
@@ -31,7 +31,7 @@ double gaussian_profile(double q) {
     return std::exp(-q / 2);
 }
 
-/// The kernel of the list whose form shaders have and whose profile this is.
+/// The listed kernel that has this profile and a form of its own in the shaders.
 int kernel_alike(double support, const std::function<double(double)>& w) {
     const auto same = [&](double (*profile)(double)) {
         const double end = std::isfinite(support) ? support : 60;
@@ -55,7 +55,7 @@ void check_support(double support) {
                            0);
 }
 
-/// Falls from 1, smooth or not: w on a grid.
+/// Checks on a grid that w falls from 1.
 void check_profile(double support, const std::function<double(double)>& w, double centre) {
     double before = 1;
     for (int i = 1; i < kGrid; ++i) {
@@ -77,7 +77,7 @@ void check_profile(double support, const std::function<double(double)>& w, doubl
     }
 }
 
-/// Without the terms that are rounding alone.
+/// The series without the terms that are only rounding.
 std::vector<double> series_of(const std::vector<double>& samples) {
     constexpr double kSeriesNoise = 2e-14;
     std::vector<double> series = ChebyshevSeries(samples).coefficients();
@@ -95,7 +95,7 @@ std::vector<double> chebyshev_samples(const std::function<double(double)>& of_u,
 /// p = u q + rest, p and q in T_k(2u - 1): u T_k = T_k / 2 + (T_k+1 + T_|k-1|) / 4.
 double divide_by_u(const std::vector<double>& p, std::vector<double>& q) {
     const std::size_t n = p.size();
-    q.assign(n + 1, 0.0);  // two zeros more than it has terms
+    q.assign(n + 1, 0.0);  // two zeros more than p has terms
     for (std::size_t j = n - 1; j >= 1; --j)
         q[j - 1] = (j == 1 ? 2 : 4) * (p[j] - q[j] / 2 - q[j + 1] / 4);
     const double rest = p[0] - q[0] / 2 - q[1] / 4;
@@ -103,10 +103,10 @@ double divide_by_u(const std::vector<double>& p, std::vector<double>& q) {
     return rest;
 }
 
-/// The same series, but nearest to w in w: the division leaves the rounding of the samples, and the
-/// rests that it took for 0, where u^m is small.
+/// Makes the series nearest to w in w itself. The division leaves rounding of the samples, and
+/// remainders that it took for 0, where u^m is small.
 void refine(KernelDefinition& d, const std::function<double(double)>& of_u) {
-    constexpr std::size_t kMostRefinedTerms = 24;  // what is analytic has some 10
+    constexpr std::size_t kMostRefinedTerms = 24;  // analytic profiles have about 10
     if (d.edge_order == 0 || d.series.size() > kMostRefinedTerms) return;
     LinearRows rows;
     for (int j = 0; j < kSeriesNodes; ++j) {
@@ -120,7 +120,7 @@ void refine(KernelDefinition& d, const std::function<double(double)>& of_u) {
     d.series = least_squares_fit(rows);
 }
 
-/// Takes u^m out of the series of w. Zeros of higher order stay in the series.
+/// Divides the series of w by u^m. Zeros of higher order stay in the series.
 void divide_edge(KernelDefinition& d) {
     while (d.edge_order < kMostEdgeOrder && d.series.size() > 1) {
         std::vector<double> rest;
@@ -140,7 +140,7 @@ void normalise(KernelDefinition& d) {
     for (double& c : d.series) c /= centre;
 }
 
-/// Largest distance of the series from w, and where.
+/// The largest distance of the series from w, and where it occurs.
 std::pair<double, double> distance(const KernelDefinition& d,
                                    const std::function<double(double)>& w, double centre) {
     const KernelProfile row = profile_of(d);
@@ -154,7 +154,7 @@ std::pair<double, double> distance(const KernelDefinition& d,
     return {largest, at};
 }
 
-/// The polynomial that the shaders would have in the place of the series.
+/// The polynomial that the shaders would use in place of the series.
 void take_polynomial(KernelDefinition& d, const KernelCoefficients& k) {
     const auto p_of_u = [&k](double u) {
         double p, dp;
@@ -178,7 +178,7 @@ std::string name_by_digest(const KernelDefinition& d) {
     return fmt::format("kernel_{:08x}", static_cast<std::uint32_t>(hash ^ hash >> 32));
 }
 
-/// w at 0, or its limit where the formula has none there.
+/// w at 0, or its limit where the formula has no value there.
 double centre_of(double support, const std::function<double(double)>& w) {
     double centre = w(0);
     if (std::isnan(centre)) {  // 0/0
@@ -251,7 +251,7 @@ KernelProfile profile_of(const KernelDefinition& d) {
     row.support = d.support;
     row.edge_order = d.edge_order;
     row.given = true;
-    row.kernel = d.like >= 0 ? d.like : KERNEL_PARABOLIC;  // which has no built-in formula either
+    row.kernel = d.like >= 0 ? d.like : KERNEL_PARABOLIC;  // which has no built-in formula, either
     if (d.like >= 0) {
         row.form = kernel_profile(d.like).form;
         row.profile = kernel_profile(d.like).profile;

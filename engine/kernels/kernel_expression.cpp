@@ -22,7 +22,7 @@ constexpr std::string_view kBlanks = " \t\r\n", kMark = "expr:";
 constexpr const char* kHelp =
     "docs/kernels.md has the grammar: expr: EXPRESSION in q, support NUMBER, name NAME";
 
-/// A part of the text that was given, and where it stands there.
+/// A part of the given text, and its place there.
 struct Part {
     std::string text;
     std::size_t at = 0;
@@ -48,7 +48,7 @@ std::vector<Part> items_of(std::string_view list) {
     return items;
 }
 
-/// Of "support 9" or "name cubic": what is behind the word.
+/// What follows the word in "support 9" or "name cubic".
 std::optional<Part> behind(std::string_view word, const Part& item) {
     if (!item.text.starts_with(word)) return std::nullopt;
     const std::size_t next = item.text.find_first_not_of(kBlanks, word.size());
@@ -57,7 +57,7 @@ std::optional<Part> behind(std::string_view word, const Part& item) {
     return Part{item.text.substr(next), item.at + next};
 }
 
-/// The text of one kernel, and where errors are found in it.
+/// The text of one kernel, and the name under which errors are reported.
 class Source {
   public:
     Source(std::string whole, const std::string& where) : whole_(std::move(whole)), where_(where) {}
@@ -103,7 +103,7 @@ void check_letters(const Source& source, const Part& part) {
 
 #ifdef DARB_MUPARSER
 
-/// An expression in q and d. One thread only.
+/// An expression in q and d. Not thread-safe.
 class Expression {
   public:
     explicit Expression(const std::string& text) {
@@ -136,7 +136,7 @@ Error parse_error(const Source& source, const Part& part, const mu::ParserError&
     return source.at(part.at + at, length, what, kHelp);
 }
 
-/// The shortest part of the expression that is not finite at q: what the carets show.
+/// The shortest part of the expression that is not finite at q, which the carets mark.
 Part culprit(const Part& part, double q) {
     Part worst = part;
     const std::size_t n = std::min<std::size_t>(part.text.size(), 120);  // n^2 short parses
@@ -164,7 +164,7 @@ double number_of(const Source& source, const Part& part) {
     }
 }
 
-/// As register_kernel would say it, at its place.
+/// Reports what register_kernel would refuse, but at its place in the text.
 void check_not_taken(const Source& source, const Part& name, const KernelDefinition& definition) {
     const std::optional<int> known = kernel_from_name(definition.name);
     const KernelDefinition* other = known ? kernel_definition(*known) : nullptr;
@@ -236,7 +236,7 @@ std::string with_carets(std::string_view text, std::size_t begin, std::size_t le
     const std::size_t from = begin > kBefore ? begin - kBefore : 0;
     std::string shown(text.substr(std::min(from, text.size()), kShown));
     for (char& c : shown)
-        if (c < ' ' || c > '~') c = '?';  // a letter each, so that the carets are below it
+        if (c < ' ' || c > '~') c = '?';  // one column each, so that the carets line up
     const std::size_t column = begin - from;
     const std::size_t most = std::max(column + 1, shown.size()) - column;
     return fmt::format("\n    {}{}\n    {}{}", from > 0 ? "..." : "", shown,

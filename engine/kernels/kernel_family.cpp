@@ -8,7 +8,7 @@ namespace darb {
 
 namespace {
 
-/// A blend as it is at shape 0.
+/// A blend at shape 0.
 struct BlendStart {
     const ShapedKernel& kernel;
     double exponent;
@@ -93,10 +93,10 @@ double covariance_scale(int kernel, Footprint footprint) {
     return derived_kernel(kernel).covariance_scale(footprint);
 }
 
-// The area of a blend is that of its parts.
+// The area under a blend follows from those of its parts.
 double equal_area_scale(int kernel, Footprint footprint) {
     if (const auto start = blend_start(kernel, footprint)) {
-        const auto integral = [&](int k) {  // a Gaussian's is 2
+        const auto integral = [&](int k) {  // 2 for a Gaussian
             const double scale = equal_area_scale(k, footprint);
             return 2 / (scale * scale * covariance_scale(k, footprint));
         };

@@ -64,7 +64,8 @@ std::vector<double> slopes_of(const Rows& rows) {
         const double before = 2 * step(i) + step(i - 1), behind = step(i) + 2 * step(i - 1);
         if (a * b > 0) slope[i] = (before + behind) / (before / a + behind / b);
     }
-    const auto at_end = [](double h, double next, double a, double b) {  // of a parabola, limited
+    const auto at_end = [](double h, double next, double a,
+                           double b) {  // slope of a parabola, limited
         const double s = ((2 * h + next) * a - h * b) / (h + next);
         return s * a <= 0 ? 0 : a * b <= 0 && std::abs(s) > 3 * std::abs(a) ? 3 * a : s;
     };
@@ -73,7 +74,7 @@ std::vector<double> slopes_of(const Rows& rows) {
     return slope;
 }
 
-/// Slopes of the spline with these end slopes; nothing where a piece of it would grow.
+/// Slopes of the spline with these end slopes; nothing where some piece would grow.
 std::optional<std::vector<double>> spline_slopes(const Rows& rows, std::vector<double> slope) {
     const std::size_t last = rows.size() - 1;
     const auto step = [&](std::size_t i) { return rows[i + 1].first - rows[i].first; };

@@ -1,6 +1,6 @@
 // Kernels in JSON files: {"name": ..., "support": ..., "expression": ...} or "table": [[q, w], ...]
-// or "function": ..., or a list of such. "function" is what darb writes: a digest of any of them
-// that needs neither expression nor table.
+// or "function": ..., or a list of these. "function" is what darb writes: a kernel in digested
+// form, which needs neither expression nor table.
 #pragma once
 
 #include <filesystem>
@@ -15,20 +15,20 @@ namespace darb {
 
 constexpr std::size_t kMostTableRows = 10'000, kMostKernelsOfFile = 100;
 
-/// q rising from 0, w falling from its first value; between them the cubic spline, or where that
-/// grows the cubics of Fritsch and Carlson, which do not. The support is the last q. Throws Error
-/// that names the row, counted from 1.
+/// Makes a kernel from a table with q rising from 0 and w falling from its first value. In between
+/// it is the cubic spline or, where that would grow, the monotone cubics of Fritsch and Carlson.
+/// The support is the last q. Throws Error naming the row, counted from 1.
 KernelDefinition kernel_from_table(std::string_view name,
                                    const std::vector<std::pair<double, double>>& rows,
                                    const std::string& where);
 
-/// Throws Error that names the file and, where there is one, the row or the place in an expression.
-/// Kernels without a name take that of the file, where it is one.
+/// Throws Error naming the file and, where known, the row or the place in an expression. A single
+/// kernel without a name takes that of the file.
 std::vector<KernelDefinition> parse_kernel_file(std::string_view text, const std::string& where);
 std::vector<KernelDefinition> read_kernel_file(const std::filesystem::path& path);
 
-/// As "function" has it, and back: same_kernel() and source survive. definition_from_json throws
-/// Error at `where`.
+/// To and from the form of "function", which preserves same_kernel() and source.
+/// definition_from_json throws Error at `where`.
 nlohmann::json definition_json(const KernelDefinition& definition);
 KernelDefinition definition_from_json(const nlohmann::json& json, const std::string& where);
 

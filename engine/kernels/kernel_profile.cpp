@@ -1,9 +1,9 @@
 #include "engine/kernels/kernel_profile.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <numbers>
 
@@ -83,11 +83,11 @@ const std::array<KernelProfile, KERNEL_ROWS> kRows{{
      cosine_pulses(3)},
     {"sinc_2_pulses", 36, 1, KERNEL_FORM_RINGS, modulus_of_sinc, KERNEL_SINC, sinc_pulses(2)},
     {"sinc_3_pulses", 81, 1, KERNEL_FORM_RINGS, modulus_of_sinc, KERNEL_SINC, sinc_pulses(3)},
-    {"beta", BETA_SUPPORT, 4, KERNEL_FORM_BETA,  // of shape 0; others: shaped_kernel.h
+    {"beta", BETA_SUPPORT, 4, KERNEL_FORM_BETA,  // with shape 0; others: shaped_kernel.h
      [](Complex q) { return square(square((BETA_SUPPORT - q) / BETA_SUPPORT)); }},
-    {"generalized_exponential", kInfinity, 0, KERNEL_FORM_EXPONENTIAL,  // of shape 0: a Gaussian
+    {"generalized_exponential", kInfinity, 0, KERNEL_FORM_EXPONENTIAL,  // with shape 0: a Gaussian
      [](Complex q) { return std::exp(-q / 2.0); }},
-    {"ges_published", kInfinity, 0, KERNEL_FORM_GES,  // of every shape
+    {"ges_published", kInfinity, 0, KERNEL_FORM_GES,  // with every shape
      [](Complex q) { return std::exp(-q / 2.0); }},
 }};
 
@@ -109,8 +109,8 @@ const KernelProfile& listed_profile(int kernel) {
 namespace {
 
 constexpr int kNodes = 64;        // enough for a pole at q = -1 with support 9
-constexpr double kNoise = 2e-15;  // of the samples: higher terms would spoil the derivative
-constexpr double kStep = 1e-200;  // of the complex-step derivative
+constexpr double kNoise = 2e-15;  // noise of the samples: higher terms would spoil the derivative
+constexpr double kStep = 1e-200;  // step of the complex-step derivative
 
 double profile_value(const KernelProfile& row, double q) {
     return row.profile({q, 0}).real();
@@ -202,7 +202,7 @@ void DerivedKernel::find_pulses() {
     if (row_.pulses.count == 1) pulses_ = {{0, row_.support}};
     double from = 0, to = row_.pulses.first_end;
     for (int pulse = 0; pulse < row_.pulses.count && row_.pulses.count > 1; ++pulse) {
-        double low = from * from, high = to * to;  // of the peak: w rises before it
+        double low = from * from, high = to * to;  // bracket the peak: w rises before it
         for (int step = 0; step < 80 && pulse > 0; ++step) {
             const double middle = (low + high) / 2;
             (slope(Footprint::psi, middle) > 0 ? low : high) = middle;
@@ -262,7 +262,7 @@ double DerivedKernel::slope(Footprint footprint, double q) const {
 double DerivedKernel::reach(Footprint footprint, double opacity, double cutoff) const {
     if (!(opacity >= cutoff)) return 0;
     double low = 0, high = 1;
-    for (const Pulse& pulse : pulses_)  // the outermost that shows, and there its falling side
+    for (const Pulse& pulse : pulses_)  // the outermost pulse that shows, on its falling side
         if (pulse.peak > 0 && opacity * value(footprint, pulse.peak) >= cutoff) low = pulse.peak;
     high = std::max(high, low);
     while (high < row_.support && opacity * value(footprint, high) >= cutoff) high *= 2;

@@ -14,40 +14,40 @@
 
 namespace darb {
 
-/// The profile as a function of complex q, so that its derivative is exact: slope(q) is
-/// Im profile(q + ih) / h with h far below rounding. It must be analytic on a neighbourhood of
-/// [0, support], accurate to a few ulp relative to its value, 1 at q = 0 and falling on the
-/// support.
+/// The profile as a function of complex q, so that its derivative is exact: slope(q) is Im
+/// profile(q + ih) / h with h far below rounding. It must be analytic on a neighbourhood of [0,
+/// support], accurate to a few ulp relative to its value, 1 at q = 0 and falling on the support.
 using Profile = std::function<std::complex<double>(std::complex<double> q)>;
 
-/// Kernels that oscillate on beyond their first zero may keep some of their rings. w is then smooth
-/// and falls from its peak to 0 within each pulse.
+/// Kernels that oscillate beyond their first zero may keep some of the following pulses. w is then
+/// smooth, and falls from its peak to 0 within each pulse.
 struct Pulses {
     int count = 1;
-    double first_end = 0, period = 0;  // of the zeros, in d; unused with one pulse
+    double first_end = 0, period = 0;  // positions of the zeros, in d; unused with one pulse
 };
 
 struct KernelProfile {
     std::string_view name;
     double support;  // R^2 in q; infinity: the profile is the Gaussian
-    int edge_order;  // of the zero at the edge in u = 1 - q/R^2: 0 jump, 1 kink, 2 double zero, ...
-    int form;  // KERNEL_FORM_*: the arithmetic of the shaders; COMPACT unless w has poles near
+    int edge_order;  // order of the zero at the edge, in u = 1 - q/R^2: 0 jump, 1 kink, 2 double
+                     // zero, ...
+    int form;        // KERNEL_FORM_*: how shaders compute it; COMPACT unless w has poles nearby
     Profile profile;
-    int kernel = -1;  // KERNEL_* of the shaders, where it is not the row's own number
+    int kernel = -1;  // KERNEL_* for the shaders, where that differs from the row's own number
     Pulses pulses{};
-    bool given = false;  // by a KernelDefinition: no more is known of its shape than that it falls
+    bool given = false;  // by a KernelDefinition: all that is known of its shape is that it falls
 };
 
-/// The rows, indexed by KERNEL_*, and behind them the registered kernels; kernel_registry.h.
+/// The rows, indexed by KERNEL_*, followed by the registered kernels; see kernel_registry.h.
 const KernelProfile& kernel_profile(int kernel);
-/// Of a blend: with the weight 1/2.
+/// The profile of a blend at weight 1/2.
 const KernelProfile& blend_profile(int kernel);
-/// Those of the list and of more pulses alone, below KERNEL_ROWS.
+/// Only the kernels of the list and those with several pulses, below KERNEL_ROWS.
 const KernelProfile& listed_profile(int kernel);
-/// KERNEL_* as shaders know it: of rings the kernel of one pulse, of a registered kernel one of the
-/// same form.
+/// KERNEL_* as shaders know it: for several pulses the kernel with one, for a registered kernel one
+/// with the same form.
 int shader_kernel(int kernel);
-/// Whether w is not 0 at the support's edge, as of inverse_quadratic. The slope of the exact
+/// Whether w is not 0 at the support's edge, as with inverse_quadratic. The slope of the exact
 /// footprint is infinite there.
 bool ends_with_a_jump(int kernel);
 
@@ -62,9 +62,9 @@ class ChebyshevSeries {
         series.coefficients_ = std::move(coefficients);
         return series;
     }
-    /// Of T_k(2u - 1), rising k; never empty but for a default one.
+    /// Coefficients of T_k(2u - 1), rising k; empty only where default-constructed.
     const std::vector<double>& coefficients() const { return coefficients_; }
-    /// value and derivative at u in [0, 1].
+    /// Value and derivative at u in [0, 1].
     void evaluate(double u, double& value, double& derivative) const;
     std::complex<double> value(std::complex<double> u) const;
 
@@ -72,23 +72,23 @@ class ChebyshevSeries {
     std::vector<double> coefficients_;
 };
 
-/// A row with all that follows from it. Building costs about a millisecond; value and slope about
-/// 0.1 us, reach and radius_quantile about 10 us.
+/// A row and everything that follows from it. Building it takes about a millisecond; value and
+/// slope about 0.1 us, reach and radius_quantile about 10 us.
 class DerivedKernel {
   public:
     explicit DerivedKernel(const KernelProfile& row);
 
     const KernelProfile& row() const { return row_; }
-    /// The ratio of moments over the whole support.
+    /// The ratio of moments over the whole support, all pulses included.
     double psi() const { return psi_; }
-    /// Where a pulse (1 to row().pulses.count) is highest and where it ends, in q.
+    /// Where a pulse (1 to row().pulses.count) peaks and where it ends, in q.
     struct Pulse {
         double peak = 0, end = 0;
     };
     const std::vector<Pulse>& pulses() const { return pulses_; }
     /// Integral of r^power w(r^2) from 0 to radius.
     double radial_moment(double radius, int power) const;
-    /// See kernel_family.h for the six below.
+    /// See kernel_family.h for these six.
     double value(Footprint footprint, double q) const;
     double slope(Footprint footprint, double q) const;
     double reach(Footprint footprint, double opacity, double cutoff) const;
@@ -102,7 +102,8 @@ class DerivedKernel {
 
     KernelProfile row_;
     std::vector<Pulse> pulses_;
-    double radius_ = 0;  // of the first pulse, or where the Gaussian is below rounding
+    double radius_ = 0;  // end of the support or the first pulse, or where a Gaussian is below
+                         // rounding
     double psi_ = 1, scale_ = 1;
     double radial_mass_ = 1;     // integral of r^2 w(r^2) over the ball of the first pulse
     ChebyshevSeries footprint_;  // A(q) / (A(0) u^(edge_order + 1/2)), in u

@@ -14,8 +14,9 @@
 namespace darb {
 namespace {
 
-constexpr int kMostKernels = 1000;  // of a process; a hostile folder of files could go on
-// The fit of a footprint that shaders may draw: more would be seen beside the reference.
+constexpr int kMostKernels = 1000;  // per process; a hostile folder of files could go on for ever
+// The largest error of a footprint's fit that may be drawn: more would be visible beside the
+// reference.
 constexpr double kDrawable = 1e-6;
 
 struct Registered {
@@ -30,7 +31,7 @@ struct Registered {
     bool exact = false;
 };
 
-/// Entries are written once, before `count` says that they are there, and never move.
+/// Entries are written once, before `count` includes them, and never move.
 struct Registry {
     std::mutex writing;
     std::array<std::unique_ptr<const Registered>, kMostKernels> entries;
@@ -68,7 +69,7 @@ const DerivedKernel& derived_kernel(int kernel) {
         throw Error(std::string(kernel_name(kernel)),
                     "has no profile of its own: each splat blends its two kernels",
                     "Name one of the two.");
-    static_cast<void>(listed_profile(kernel));  // throws for what is none
+    static_cast<void>(listed_profile(kernel));  // throws for ids that do not exist
     return kernels[static_cast<std::size_t>(kernel)];
 }
 
@@ -84,8 +85,8 @@ bool has_exact_footprint(int kernel) {
     const Registered* entry = registered(kernel);
     if (entry != nullptr) return entry->exact;
     if (const auto parts = blend_parts(kernel)) {
-        // The slope of a quadric's line integral grows without bound at its edge, which matters
-        // where the other kernel goes on: w is no longer below any cut-off there.
+        // The slope of a quadric's line integral grows without bound at its edge. This matters
+        // where the other kernel extends further, as w is then not below every cut-off there.
         const auto ends_inside = [](const KernelProfile& one, const KernelProfile& other) {
             return one.form == KERNEL_FORM_QUADRIC && one.support < other.support;
         };
@@ -143,7 +144,7 @@ int register_kernel_of_file(KernelDefinition definition, const std::string& wher
         const std::string name = definition.name;
         for (int suffix = 2;; ++suffix) {
             const std::optional<int> known = kernel_from_name(definition.name);
-            // The family may have got the name after the file.
+            // The family may have got this name after the file was written.
             const KernelDefinition* other = known ? kernel_definition(*known) : nullptr;
             if (!known || (other != nullptr && other->same_kernel(definition))) break;
             definition.name = fmt::format("{}_{}", name.substr(0, kMostNameLength - 4), suffix);

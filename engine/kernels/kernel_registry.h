@@ -1,6 +1,6 @@
-// Kernels beyond the list that shaders know. A registered kernel has an id as the others have, from
-// KERNEL_ROWS on, and all of kernel_family.h, kernel_coefficients.h and what takes a kernel accept
-// it. Ids are of one process; files hold the definition.
+// Kernels beyond the list that shaders know. A registered kernel has an id like the others, from
+// KERNEL_ROWS on, which kernel_family.h, kernel_coefficients.h and everything else that takes a
+// kernel accept. Ids are valid within one process; files store the definition.
 #pragma once
 
 #include <functional>
@@ -12,19 +12,19 @@
 
 namespace darb {
 
-/// The id of this kernel; the same for the same kernel. Safe from several threads. Throws Error
-/// where the name belongs to another kernel, and ProfileFault as check_definition.
+/// The id of this kernel; equal kernels get equal ids. Thread-safe. Throws Error where the name
+/// belongs to another kernel, and ProfileFault as check_definition does.
 int register_kernel(const KernelDefinition& definition);
-/// w(q) on (0, support) as a kernel of this name, in one call.
+/// Defines and registers w(q) on (0, support) under this name, in one call.
 int register_kernel(std::string_view name, double support, const std::function<double(double)>& w);
-/// As the first, for what a file holds: where the name belongs to another kernel the new one is
-/// called NAME_2 or so, and notes say so. Throws Error at `where`.
+/// Registers a kernel from a file: where its name belongs to another kernel, it is renamed to
+/// NAME_2 or so, with a note. Throws Error at `where`.
 int register_kernel_of_file(KernelDefinition definition, const std::string& where,
                             std::vector<std::string>& notes);
 
-/// Null for the kernels of the list.
+/// The definition of a registered kernel; null for the kernels of the list.
 const KernelDefinition* kernel_definition(int kernel);
-/// The list, without rows of more pulses, and behind it what was registered.
+/// The kernels of the list, without those of several pulses, followed by the registered ones.
 std::vector<int> known_kernels();
 
 }  // namespace darb

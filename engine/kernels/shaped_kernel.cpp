@@ -1,9 +1,9 @@
 #include "engine/kernels/shaped_kernel.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fmt/format.h>
 #include <iterator>
 #include <memory>
 #include <mutex>
@@ -18,8 +18,8 @@
 
 namespace darb {
 
-/// At (k + 1/2) / count of a density over [0, radius], density(x) at the radius x * radius. x =
-/// sin^2 a: even steps in a are fine at both ends.
+/// Quantiles, at (k + 1/2) / count, of a density over [0, radius]; density(x) is that at the radius
+/// x * radius. With x = sin^2 a, even steps in a are fine at both ends.
 template <class Density>
 std::vector<double> density_quantiles(double radius, int count, const Density& density) {
     constexpr int kSteps = 4096;
@@ -101,7 +101,7 @@ double splat_exponent(int kernel, Footprint footprint, double shape) {
     return row != nullptr ? row->exponent(footprint, shape) : 0;
 }
 
-// The kernel `beta`: everything of it has a closed form but the quantiles.
+// The kernel `beta`: everything but its quantiles has a closed form.
 
 namespace {
 
@@ -163,7 +163,7 @@ class BetaKernel : public ShapedKernel {
     }
 
     double rounding(double exponent) const override {
-        return 2e-7 + 2e-7 * exponent;  // of the logarithm
+        return 2e-7 + 2e-7 * exponent;  // rounding of the logarithm
     }
 
     std::vector<double> exponents_to_check() const override {
@@ -182,14 +182,14 @@ double beta_shape_of(double b) {
     return std::log(b / BETA_START);
 }
 
-// Blends of two kernels of the list, w = (1 - m) w1 + m w2, m of each splat. With the exact
-// footprint m is that of the line integrals divided by their values at the centre. Everything
-// follows from what the two kernels have.
+// Blends of two listed kernels, w = (1 - m) w1 + m w2, with m from splat to splat. With the exact
+// footprint, m weights the line integrals divided by their values at the centre. Everything follows
+// from the two kernels.
 
 namespace {
 
 constexpr double kMostShape = 30;  // 1 - m is above rounding
-constexpr double kLastShape = 6;   // of the tables: m within 0.25 % of 0 and 1
+constexpr double kLastShape = 6;   // last row of the tables: m within 0.25 % of 0 and 1
 
 class BlendKernel : public ShapedKernel {
   public:
@@ -476,7 +476,7 @@ const ShapedKernel& exponential_kernel() {
     return kernel;
 }
 
-// The kernel `ges_published`: a Gaussian of every exponent, and a factor of its lengths.
+// The kernel `ges_published`: the same Gaussian for every exponent, and a factor on its lengths.
 
 namespace {
 

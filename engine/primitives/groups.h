@@ -1,5 +1,5 @@
-// How many workgroups a pass over `count` items takes, in two dimensions where one is not enough;
-// the shader side is shaders/lib/linear_id.glsl.
+// How many workgroups a pass over `count` items takes, in two dimensions where one does not
+// suffice; shaders/lib/linear_id.glsl is the shader side.
 #pragma once
 
 #include <cstdint>

@@ -17,10 +17,11 @@ namespace {
 
 constexpr int kDigitBits = 8;
 constexpr std::uint32_t kRowBytes = RADIX_MAX_DIGITS * 4;  // counters of a subgroup
-// 1024 keys a thread make the 256 counters of its column cheap; 8 lanes are then 8192 keys a block.
+// With 1024 keys per thread, the 256 counters of its column are cheap; with 8 lanes, a block has
+// 8192 keys.
 constexpr std::uint32_t kColumnItems = 1024;
 constexpr std::uint32_t kBallotThreads = 256, kBallotItems = 16;
-constexpr std::uint32_t kSumBytes = 64 * 4;  // of subgroups, at most
+constexpr std::uint32_t kSumBytes = 64 * 4;  // sums of the subgroups, at most
 constexpr std::uint32_t kOffsetThreads = 256;
 
 SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_t subgroups,
@@ -46,11 +47,12 @@ RadixSort::Shape RadixSort::choose_shape(const Device& device, SortScatter scatt
                                          std::uint32_t subgroup_size) {
     const std::uint32_t lanes = subgroup_size != 0 ? subgroup_size : device.info().subgroup_size;
     if (scatter == SortScatter::columns) return {lanes, kColumnItems, 1};
-    // On Intel all threads of a subgroup share 4 KiB of registers: keys and ranks of 16 would fill
-    // them.
+    // On Intel, all threads of a subgroup share 4 KiB of registers, which keys and ranks of 16
+    // would fill.
     const std::uint32_t fewest = device.info().min_subgroup_size;
     const std::uint32_t items = fewest <= 16 && fewest < lanes ? kBallotItems / 2 : kBallotItems;
-    // Of a thread: its share of a subgroup's row, and its keys. Besides a row of the block.
+    // Shared memory that a thread takes: its share of a subgroup's row, and its keys. The block's
+    // row comes on top.
     const std::uint32_t bytes = kRowBytes / lanes + items * 4;
     const std::uint32_t room = device.info().shared_memory_bytes - kRowBytes - kSumBytes;
     const std::uint32_t threads = std::clamp(std::bit_floor(room / bytes), lanes, kBallotThreads);
@@ -86,7 +88,7 @@ RadixSort::RadixSort(Device& device, std::uint32_t capacity, std::optional<SortS
     make_buffers(device, *this, buffers(capacity, shape_), "sort");
 }
 
-// One workgroup a block.
+// One workgroup per block.
 std::uint64_t RadixSort::max_capacity(const Device& device) {
     return std::uint64_t{device.info().max_groups_x} *
            choose_shape(device, device.tuning().scatter, 0).block();
@@ -130,7 +132,7 @@ void RadixSort::record(Commands& commands, const Buffer& keys, const Buffer& val
     }
     int done_bits = 0;
     for (int pass = 0; pass < passes; ++pass) {
-        // Equal digits: 12 bits as 6 + 6 have fewer counters than 8 + 4.
+        // Equal digits: 12 bits as 6 + 6 need fewer counters than 8 + 4.
         const int bits = (key_bits - done_bits + passes - pass - 1) / (passes - pass);
         const gpu::RadixPassArgs pass_args{static_cast<std::uint32_t>(done_bits), 1U << bits,
                                            static_cast<std::uint32_t>(pass) * RADIX_MAX_DIGITS};

@@ -1,7 +1,7 @@
 // RadixSort: stable sort of (uint32 key, uint32 value) pairs on the device, least significant digit
-// first, up to 8 bits a pass, each pass histogram -> offsets -> scatter. No forward progress
-// between workgroups and no subgroup size is assumed; the result is the one stable order, so it
-// repeats.
+// first, with up to 8 bits per pass; each pass is histogram -> offsets -> scatter. It assumes no
+// forward progress between workgroups and no subgroup size. A stable sort has only one result, so
+// every run gives the same.
 #pragma once
 
 #include <cstdint>
@@ -17,27 +17,28 @@ namespace darb {
 
 class RadixSort {
   public:
-    /// capacity: the most pairs, > 0. Owns 8 bytes of scratch a pair and a kilobyte a block.
-    /// scatter: same result, other cost; absent: as the device is tuned. subgroup_size: 0 = the
-    /// device's own.
+    /// capacity: the largest number of pairs, > 0. Allocates 8 bytes of scratch memory per pair and
+    /// a kilobyte per block. scatter: the method, which affects the cost but not the result;
+    /// absent: as the device is tuned. subgroup_size: 0 = the device's own.
     RadixSort(Device& device, std::uint32_t capacity, std::optional<SortScatter> scatter = {},
               std::uint32_t subgroup_size = 0);
 
     std::uint32_t capacity() const { return capacity_; }
-    /// What the device's groups of workgroups allow an automatic sort; more is an Error.
+    /// The largest capacity of an automatic sort that the device's limits on workgroups allow; more
+    /// is an Error.
     static std::uint64_t max_capacity(const Device& device);
-    /// Device memory of an automatic sort of this capacity.
+    /// Device memory taken by an automatic sort of this capacity, bytes.
     static std::uint64_t device_bytes(const Device& device, std::uint32_t capacity);
     SortScatter scatter() const { return scatter_; }
-    /// Pairs of one workgroup.
+    /// Number of pairs that one workgroup sorts.
     std::uint32_t block() const { return shape_.block(); }
 
     /// Sorts the first n pairs by the lowest key_bits (1..32) bits of their keys, in place; higher
-    /// bits ride along and pairs from n on are not touched. n is the word of count_buffer at
-    /// count_offset (bytes, a multiple of 4), cut to the capacity; n = 0 is legal. keys and values
-    /// hold [capacity] words. iota_values: values need not be filled, value i is i.
-    /// Cheapest where key_bits make an even number of digits (9..16, 25..32); else the pairs are
-    /// copied once more. Everything belongs to the current pass() of commands.
+    /// bits are carried along, and pairs from n on are not touched. n is the word of count_buffer
+    /// at count_offset (bytes, a multiple of 4), limited to the capacity; n = 0 is allowed. keys
+    /// and values hold [capacity] words. iota_values: values need not be filled; value i is i.
+    /// Cheapest where key_bits give an even number of digits (9..16, 25..32); otherwise the pairs
+    /// are copied once more. Records into the current pass() of commands.
     void record(Commands& commands, const Buffer& keys, const Buffer& values,
                 const Buffer& count_buffer, std::uint64_t count_offset, int key_bits,
                 bool iota_values = false);
@@ -45,8 +46,8 @@ class RadixSort {
   private:
     struct Shape {
         std::uint32_t threads = 0;
-        std::uint32_t items = 0;      // keys of one thread
-        std::uint32_t subgroups = 0;  // of one workgroup, where each ranks by itself
+        std::uint32_t items = 0;      // keys per thread
+        std::uint32_t subgroups = 0;  // in one workgroup, where each ranks by itself
         std::uint32_t block() const { return threads * items; }
     };
     static BufferList<RadixSort> buffers(std::uint32_t capacity, const Shape& shape);
@@ -61,7 +62,7 @@ class RadixSort {
     std::uint32_t capacity_;
     SortScatter scatter_;
     Shape shape_;
-    std::uint32_t rows_per_group_ = 1;  // of the offsets
+    std::uint32_t rows_per_group_ = 1;  // rows of the offsets per group
     Pipeline prepare_, histogram_, offsets_, rank_, rank_iota_;
     Buffer plan_, histograms_, totals_, keys_temp_, values_temp_;
 };

@@ -11,8 +11,9 @@ namespace darb {
 
 namespace {
 
-// Elements of one chunk. More mean fewer chunk sums for the one workgroup at the top, less mean
-// more parallel work; with 65,535 groups of at least 4 teams the scan holds over 67 M elements.
+// Elements in a chunk. More elements mean fewer chunk sums for the one workgroup at the top; fewer
+// mean more parallel work. With 65,535 groups of at least 4 teams, the scan holds over 67 M
+// elements.
 constexpr std::uint32_t kChunk = 256;
 constexpr std::uint32_t kThreads = 128, kThreadsLavapipe = 32;
 constexpr std::uint32_t kTopThreads = 256, kTopThreadsLavapipe = 32;

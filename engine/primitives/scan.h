@@ -1,6 +1,6 @@
-// Scan: exclusive prefix sum of uint32 on the device, reduce-then-scan in four dispatches
-// (prepare, reduce, top, apply; after Merrill and Grimshaw 2009). No forward progress between
-// workgroups and no subgroup size is assumed, and the result never depends on timing.
+// Scan: exclusive prefix sum of uint32 on the device, reduce-then-scan in four dispatches (prepare,
+// reduce, top, apply; after Merrill and Grimshaw 2009). It assumes no forward progress between
+// workgroups and no subgroup size, and the result never depends on timing.
 #pragma once
 
 #include <cstdint>
@@ -19,23 +19,23 @@ class Scan {
     };
     static Strategy best_strategy(const Device& device);
 
-    /// What the device's groups of workgroups allow.
+    /// The largest capacity that the device's limits on workgroups allow.
     static std::uint64_t max_capacity(const Device& device, const Strategy& strategy);
-    /// capacity: the most elements, > 0. Owns one word of scratch memory per chunk of elements.
-    /// Throws Error beyond max_capacity.
+    /// capacity: the largest number of elements, > 0. Allocates one word of scratch memory per
+    /// chunk of elements. Throws Error beyond max_capacity.
     Scan(Device& device, std::uint32_t capacity);
     Scan(Device& device, std::uint32_t capacity, const Strategy& strategy);
 
     std::uint32_t capacity() const { return capacity_; }
 
-    /// Device memory of a scan of this capacity.
+    /// Device memory taken by a scan of this capacity, bytes.
     static std::uint64_t device_bytes(std::uint32_t capacity);
 
-    /// offsets[i] = counts[0] + ... + counts[i - 1] for i < n, modulo 2^32, with n the word of
-    /// count_buffer at count_offset (bytes, a multiple of 4), at most the capacity; n = 0 is legal.
-    /// The sum of all n goes to the word of total at its offset (a multiple of 4). counts and
-    /// offsets hold [capacity] words and may be the same buffer. Everything belongs to the current
-    /// pass() of commands.
+    /// offsets[i] = counts[0] + ... + counts[i - 1] for i < n, modulo 2^32, where n is the word of
+    /// count_buffer at count_offset (bytes, a multiple of 4), limited to the capacity; n = 0 is
+    /// allowed. The sum of all n is written to the word of total at its offset (a multiple of 4).
+    /// counts and offsets hold [capacity] words, and may be the same buffer. Records into the
+    /// current pass() of commands.
     void record(Commands& commands, const Buffer& counts, const Buffer& offsets,
                 const Buffer& count_buffer, std::uint64_t count_offset, const BufferRange& total);
 

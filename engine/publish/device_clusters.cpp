@@ -11,12 +11,12 @@ namespace darb {
 namespace {
 
 constexpr std::uint32_t kThreads = 64;
-// Rows of a thread on lavapipe, where loads of centres cost: as many as Mesa 22.3 unrolls with some
-// room. With 5 it is a tenth faster, with 6 three times slower.
+// Rows per thread on lavapipe, where loads of centres are expensive: as many as Mesa 22.3 unrolls,
+// with some margin. With 5 it is a tenth faster, with 6 three times slower.
 constexpr std::uint32_t kLavapipeRows = 4;
-constexpr std::uint64_t kPartBytes = 32 << 20;  // of rows on the device at once
+constexpr std::uint64_t kPartBytes = 32 << 20;  // rows on the device at a time
 
-/// [count][quads * 4]: padded with zeros.
+/// Padded with zeros to [count][quads * 4].
 std::vector<float> padded(const float* from, std::size_t count, std::size_t dims,
                           std::size_t quads) {
     std::vector<float> to(count * quads * 4, 0);
@@ -32,10 +32,10 @@ std::vector<float> squares_of(const std::vector<float>& centres, std::size_t dim
     return squares;
 }
 
-/// Batches that go to the device together: whole ones, rows [first, first + rows).
+/// Batches that go to the device together; each is whole. Rows [first, first + rows).
 struct DevicePart {
     std::uint32_t first = 0, rows = 0;
-    std::vector<gpu::ClusterGroup> groups;  // rows from the part's first
+    std::vector<gpu::ClusterGroup> groups;  // rows relative to the part's first
 };
 
 std::vector<DevicePart> parts_of(const std::vector<ClusterBatch>& batches, std::size_t row_bytes,

@@ -1,4 +1,4 @@
-// The nearest centres of cluster_rows (engine/scene/cluster_rows.h) on a device.
+// Finds the nearest centres for cluster_rows (engine/scene/cluster_rows.h) on a device.
 #pragma once
 
 #include <cstdint>
@@ -15,15 +15,16 @@ namespace darb {
 
 class DeviceClusters {
   public:
-    /// The device has to outlive it.
+    /// The device must outlive this object.
     explicit DeviceClusters(Device& device) : device_(device), commands_(device) {}
 
-    /// As AssignRows has it; rows go to the device in parts. The same device gives the same labels;
-    /// another one, and the host, may tell centres of nearly one distance apart otherwise.
+    /// See AssignRows; rows are sent to the device in parts. A device always gives the same labels;
+    /// another device, or the host, may decide differently between centres at nearly equal
+    /// distances.
     void assign(const std::vector<float>& rows, std::size_t dims, const std::vector<float>& centres,
                 const std::vector<ClusterBatch>& batches, std::vector<std::uint32_t>& labels);
 
-    /// For EncodeOptions; this has to outlive it.
+    /// For EncodeOptions. This object must outlive the result.
     AssignRows assign_rows() { return std::bind_front(&DeviceClusters::assign, this); }
 
   private:
@@ -32,7 +33,7 @@ class DeviceClusters {
 
     Device& device_;
     Commands commands_;
-    std::map<std::size_t, Pipeline> pipelines_;  // by the quads of a row
+    std::map<std::size_t, Pipeline> pipelines_;  // by the number of quads in a row
 };
 
 }  // namespace darb

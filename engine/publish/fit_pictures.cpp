@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kFittedViews = 8;
 constexpr int kFittedWidth = 800;      // px
-constexpr double kShareOfRoom = 0.98;  // as fewer splats deflate a little worse
+constexpr double kShareOfRoom = 0.98;  // because fewer splats deflate slightly worse
 
 Camera pinhole_at_most(Camera camera, int width) {
     camera.lens = {};
@@ -28,7 +28,7 @@ Camera pinhole_at_most(Camera camera, int width) {
                    std::max(1, static_cast<int>(std::lround(camera.height * share))));
 }
 
-/// Splats whose output is likely to be no larger, fewer than there are.
+/// A smaller number of splats whose output is likely to fit.
 std::size_t count_that_fits(std::size_t splats, std::size_t fixed, std::size_t bytes,
                             std::uint64_t most) {
     const double share = (static_cast<double>(most) - static_cast<double>(fixed)) /
@@ -48,7 +48,7 @@ struct Search {
     const PictureLimits& limits;
     PictureOutput& output;
 
-    /// The level, or the next finer ones, by pictures alone.
+    /// Chooses the level, or the next finer ones, by pictures alone.
     PictureFit by_pictures() const {
         std::vector<PictureLoss> losses;
         PictureFit fit;
@@ -66,7 +66,7 @@ struct Search {
         return fit;
     }
 
-    /// Merges until the output, which is finished and too large, fits.
+    /// Merges until the output fits, which is finished but too large.
     void shrink(PictureFit& fit, SplatModel& kept) const {
         while (fit.bytes > limits.max_bytes) {
             const SplatModel& from = kept.size() > 0 ? kept : source;
@@ -139,7 +139,7 @@ PictureFit fit_pictures(const SplatModel& source, const PictureMeasure* measure,
     if (limits.max_bytes == 0 || best.bytes <= limits.max_bytes) return best;
     SplatModel kept;
     search.shrink(best, kept);
-    bool last = true;  // whether the best one is what the output holds
+    bool last = true;  // whether the output holds the best one
     for (int level = best.level - 1; measure && level >= limits.least_level; --level) {
         SplatModel fewer;
         const PictureFit next = search.at_level(level, fewer);

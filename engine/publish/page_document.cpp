@@ -1,7 +1,7 @@
 #include "engine/publish/page_document.h"
 
-#include <cmath>
 #include <fmt/format.h>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
@@ -23,13 +23,13 @@
 
 namespace darb {
 
-/// name: of a file in engine/publish/page, "project.frag". Specialization constants of the source
-/// become constants: of the values given, else as declared.
+/// name: a file in engine/publish/page, such as "project.frag". Specialization constants in the
+/// source become constants, with the values given, or else as declared.
 std::string page_shader(std::string_view name, const SpecConstants& constants);
 
 namespace {
 
-constexpr std::size_t kPayloadPart = 3 << 16;  // of the payload in one element
+constexpr std::size_t kPayloadPart = 3 << 16;  // bytes of the payload in one element
 const std::string kFolder = "engine/publish/page/";
 
 using Json = nlohmann::json;
@@ -39,7 +39,7 @@ Json json_of(const glm::dvec3& v) {
     return {v.x, v.y, v.z};
 }
 
-/// Nothing put in is looked at again, whatever it holds.
+/// Inserted text is not scanned again, whatever it contains.
 std::string filled(std::string_view form, const Texts& texts) {
     std::string out;
     for (std::size_t open = 0; (open = form.find("{{")) != std::string_view::npos;) {
@@ -186,8 +186,8 @@ std::string constant_text(const SpecValue& value) {
     return text;
 }
 
-/// A line without its comment and indentation; of a constant within a function, which may depend on
-/// more than constants here but not in ES, the variable.
+/// A line without its comment and indentation. A constant inside a function becomes a variable,
+/// because in GLSL it may depend on more than constants, but not in ES.
 std::string plain_line(std::string line, bool& in_function) {
     line.erase(std::min(line.find("//"), line.size()));
     line.erase(line.find_last_not_of(" \t") + 1);
@@ -206,7 +206,7 @@ std::string specialized(const std::string& line, const SpecConstants& constants)
     return fmt::format("const {0} {1} = {0}({2});", match.str(1), match.str(2), value);
 }
 
-/// A function, or what stands between functions, which has no name.
+/// A function, or the text between functions, which has no name.
 struct Piece {
     std::string name, text;
 };
@@ -235,7 +235,7 @@ struct Source {
     void add_file(const std::string& name) {
         if (!included.insert(name).second) return;
         std::string_view rest = page_file(name);
-        bool open = false;  // in a function
+        bool open = false;  // inside a function
         while (!rest.empty()) {
             const std::size_t end = rest.find('\n');
             bool in_function = false;
@@ -255,7 +255,7 @@ struct Source {
         }
     }
 
-    /// Without functions that nothing calls.
+    /// The text without functions that are never called.
     std::string text() const {
         std::set<std::string> words{"main"};
         std::vector<bool> kept(pieces.size(), false);
@@ -290,7 +290,7 @@ std::string script_json(const nlohmann::json& value) {
     const std::string json = value.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
     std::string out;
     out.reserve(json.size());
-    // Both stand in strings alone, where an escape is the same text.
+    // Both occur only inside strings, where an escape means the same.
     for (const char c : json) {
         if (c == '<')
             out += "\\u003c";

@@ -1,4 +1,4 @@
-// The document of a web page from its parts: text, script, shaders, splats.
+// Assembles the document of a web page from its parts: text, script, shaders, splats.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -14,29 +14,29 @@ namespace darb {
 struct PageDocument {
     std::string title, facts;
     std::vector<View> views;  // at least one
-    std::size_t start = 0;    // of views
+    std::size_t start = 0;    // index into views
     glm::dvec3 up{0, -1, 0};  // world
     glm::vec3 background{0.0f};
-    std::vector<std::byte> poster;  // JPEG of views[start]
+    std::vector<std::byte> poster;  // JPEG that shows views[start]
 };
 
-/// Where the splats begin in a document.
+/// The offset in a document at which the splats begin.
 constexpr std::string_view kFirstPart = "<script type=\"text/plain\" id=\"part0\">";
 
-/// model: of which the splats are packed.
+/// model: the scene whose splats are packed.
 std::string page_document(const PageDocument& document, const SplatModel& model,
                           const PageSplats& packed);
 
-/// Bytes of a document that are script and shaders.
+/// How many bytes of a document are script and shaders.
 std::size_t page_script_bytes();
 
-// Text that goes into a script of an HTML page: data never ends it.
+// Text that is embedded in the script of an HTML page, where data must never end it.
 
 /// JSON in ASCII without '<' or '>', fit for a <script> of any type: "</script>", "<!--", marks of
-/// direction and line separators are escapes. What is no UTF-8 becomes U+FFFD.
+/// writing direction and line separators are escaped. Bytes that are not UTF-8 become U+FFFD.
 std::string script_json(const nlohmann::json& value);
 
-/// Source without its comment lines ("//" first), blank lines and indentation.
+/// The source without its comment lines ("//" first), blank lines and indentation.
 std::string without_comment_lines(std::string_view source);
 
 }  // namespace darb

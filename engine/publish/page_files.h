@@ -1,4 +1,4 @@
-// The sources of the web page and the shaders that it shares with darb, embedded at build time by
+// The sources of the web page, and the shaders that it shares with darb, embedded at build time by
 // cmake/embed.cmake.
 #pragma once
 
@@ -7,14 +7,14 @@
 namespace darb {
 
 struct PageFile {
-    std::string_view name;  // path below the root of the tree: "engine/publish/page/page.css"
+    std::string_view name;  // path from the root of the tree: "engine/publish/page/page.css"
     std::string_view text;
 };
 
-/// Ends with a nameless one.
+/// The list ends with an entry without a name.
 extern const PageFile kPageFiles[];
 
-/// The text of a file by its path below the root; aborts where it is not embedded.
+/// The text of a file, by its path from the root; aborts where it is not embedded.
 std::string_view page_file(std::string_view name);
 
 }  // namespace darb

@@ -19,9 +19,9 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kChunk = 256;  // splats, of the order
+constexpr std::size_t kChunk = 256;  // splats, for chunk_order
 constexpr double kMostInteger = 4294967294.0;
-constexpr std::size_t kSample = 1 << 16;  // bytes that decide whether differences are smaller
+constexpr std::size_t kSample = 1 << 16;  // bytes used to decide whether differences are smaller
 
 using Values = std::function<double(std::size_t)>;
 
@@ -49,7 +49,7 @@ int bytes_of(const std::vector<std::uint32_t>& integers) {
     return std::max(1, (static_cast<int>(std::bit_width(any)) + 7) / 8);
 }
 
-/// The planes of integers, or of the sample in their middle.
+/// The planes of the integers, or of the sample in their middle.
 std::vector<std::byte> planes_of(const std::vector<std::uint32_t>& integers, int bytes,
                                  std::size_t most) {
     const std::size_t count = std::min(integers.size(), most);
@@ -88,7 +88,7 @@ void add_rounded(int attribute, int component, double step, const Values& value,
     }
     if (to.count == 0) low = high = 0;
     step = std::max(step, (high - low) / kMostInteger);
-    low = std::floor(low / step) * step;  // so that 0 is a step
+    low = std::floor(low / step) * step;  // so that 0 is on a step
     std::vector<std::uint32_t> integers(to.count);
     for (std::size_t i = 0; i < to.count; ++i)
         integers[i] =
@@ -97,7 +97,7 @@ void add_rounded(int attribute, int component, double step, const Values& value,
                  integers, to);
 }
 
-/// Of the second largest standard deviations, the one that a tenth of the splats have less than.
+/// The 10 % quantile of the splats' second largest standard deviations, world units.
 double typical_size(const SplatModel& model) {
     std::vector<float> middle;
     for (std::size_t i = 0; i < model.size(); ++i) {
@@ -186,8 +186,9 @@ void join_rotations(SplatModel& model) {
 PagePrecision page_precision(int level, int kernel) {
     if (level >= kPageLevels) return {.exact = true};
     const double share = std::ldexp(1.0, -level);
-    // Where w ends with a jump, pixels between the true outline and the rounded one are off by all
-    // of it. With these steps the inverse quadratic comes as near at level 0 as other kernels.
+    // Where w ends with a jump, pixels between the true outline and the rounded one are off by the
+    // whole jump. With these steps, the inverse quadratic is as accurate at level 0 as other
+    // kernels.
     const bool jumps = ends_with_a_jump(kernel);
     return {.position = share / 8,
             .log_scale = share / (jumps ? 200 : 20),

@@ -1,5 +1,5 @@
-// The splats of a web page: columns of integers, or of float32, that the page's script
-// (page/1_decode.js) turns back into values. Source of the order: engine/scene/chunk_order.h.
+// The splats of a web page: columns of integers or of float32, which the page's script
+// (page/1_decode.js) turns back into values. For the order, see engine/scene/chunk_order.h.
 #pragma once
 
 #include <cstddef>
@@ -10,30 +10,32 @@
 
 namespace darb {
 
-/// Steps that values are rounded to.
+/// Step sizes to which values are rounded.
 struct PagePrecision {
-    bool exact = false;              // float32 as it is, in the order of the model; no step counts
-    double position = 0;             // of a typical splat's second largest standard deviation
+    bool exact = false;              // float32 unchanged, in the order of the model; steps are
+                                     // ignored
+    double position = 0;             // as a share of a typical splat's second largest standard
+                                     // deviation
     double log_scale = 0;            // natural logarithm
-    double rotation = 0;             // of a component of the unit quaternion
+    double rotation = 0;             // for each component of the unit quaternion
     double opacity = 0, colour = 0;  // both 0 to 1
-    double harmonics = 0;            // of a coefficient above the first
+    double harmonics = 0;            // for coefficients above the first
 };
 
-/// 0 is the coarsest; each level has half the steps of the one before; kPageLevels and above are
-/// exact.
+/// Level 0 is the coarsest; each level halves the steps of the one before; kPageLevels and above
+/// are exact.
 constexpr int kPageLevels = 4;
 PagePrecision page_precision(int level, int kernel);
 
-/// value = low + step * integer, or the bits of a float32. A column is `bytes` planes of N bytes,
-/// low bytes first.
+/// value = low + step * integer, or the bits of a float32. A column is stored as `bytes` planes of
+/// N bytes each, low bytes first.
 struct PageColumn {
     int attribute =
         0;  // kPosition, ...; of kOpacityLogit the opacity itself, unless exact the logit
     int component = 0;  // rotation, unless exact: 0 to 2 of SmallestThree::others, 3 its largest
     int bytes = 1;
     double low = 0, step = 1;
-    bool difference = false;  // integers are zigzag differences from the splat before
+    bool difference = false;  // integers are zigzag-coded differences from the splat before
     bool exact = false;
 };
 
@@ -41,13 +43,14 @@ struct PageSplats {
     std::size_t count = 0;  // N
     int sh_degree = 0;
     std::vector<PageColumn> columns;
-    std::vector<std::byte> planes;  // of all columns, in order
+    std::vector<std::byte> planes;  // all columns, in order
 };
 
-/// Without splats that are never drawn: those with NaN, without a rotation, and of an opacity below
-/// the cut-off.
+/// Leaves out splats that are never drawn: those with NaN, without a rotation, or with an opacity
+/// below the cut-off.
 PageSplats pack_page_splats(const SplatModel& model, const PagePrecision& precision);
-/// What the page draws. like: kernel, footprint and all else that is not per splat.
+/// The model as the page draws it. like: gives kernel, footprint and everything else that is not
+/// per splat.
 SplatModel unpack_page_splats(const PageSplats& packed, const SplatModel& like);
 
 }  // namespace darb

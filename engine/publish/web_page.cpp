@@ -77,7 +77,7 @@ std::string facts_text(const SplatModel& model, const WebPageFacts& facts) {
         DARB_VERSION);
 }
 
-/// The page of the splats that were packed last.
+/// The page with the splats that were packed last.
 class FittedPage : public PictureOutput {
   public:
     FittedPage(Device& device, const SplatModel& source, PageDocument& document)

@@ -1,7 +1,7 @@
-// Ranks by MPI. All calls of MPI go through one lock, so that MPI_THREAD_SERIALIZED does; waits
-// look for what has come and sleep in between, so that a waiting rank takes no core from its
-// neighbours. A thread of each rank says every second that the process is alive: a rank that
-// computes for minutes is, one that was stopped or lost its network is not.
+// Ranks over MPI. All MPI calls go through one lock, so that MPI_THREAD_SERIALIZED suffices.
+// Waiting ranks poll and sleep in between, so that they take no core from their neighbours. A
+// thread of each rank reports every second that its process is alive: a rank that computes for
+// minutes is; one that was stopped, or lost its network, is not.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <mpi.h>
@@ -32,12 +32,13 @@ using std::chrono::duration;
 using std::chrono::milliseconds;
 
 constexpr int kSizeTag = 1, kBytesTag = 2, kAliveTag = 3;
-constexpr std::size_t kMostBytes = 1u << 30;  // of one message: MPI counts in int
+constexpr std::size_t kMostBytes = 1u << 30;  // per message, because MPI counts in int
 constexpr auto kBeat = milliseconds(500);
-constexpr double kSilentSeconds = 12;  // DARB_RANK_TIMEOUT has another
-// The first rank watches all and the others the first: where that is silent, rank 1 is to say so.
+constexpr double kSilentSeconds = 12;  // unless DARB_RANK_TIMEOUT is set
+// The first rank watches all others, and they watch the first; where that falls silent, rank 1
+// reports it.
 constexpr double kLaterSeconds = 3;
-// What fails on all ranks is said by the first, which ends the others while they wait for that.
+// What fails on all ranks is reported by the first, which ends the others while they wait for that.
 constexpr auto kFirstSpeaks = milliseconds(1500);
 constexpr int kLauncherSeconds = 6, kMostFiles = 4096;
 constexpr auto kLongestNap = std::chrono::microseconds(400);
@@ -48,10 +49,10 @@ double silent_seconds() {
     return seconds > 0 ? seconds : kSilentSeconds;
 }
 
-// mpirun waits to hear of a machine that cannot be reached for a quarter of an hour. A process of
-// its own tells it to end after kLauncherSeconds, and goes with it where it ends before. It holds
-// no file, as the lock of the run's folder. Open MPI 4.1 then ends by a segmentation fault of
-// mpirun, as a signal by hand makes it.
+// mpirun waits a quarter of an hour to hear from a machine that cannot be reached. A process of its
+// own tells it to end after kLauncherSeconds, and ends together with it if that comes first. It
+// holds no file open, such as the lock of the run's folder. Open MPI 4.1 then ends with a
+// segmentation fault of mpirun, as it does after a signal sent by hand.
 void end_launcher_later() {
     const pid_t launcher = ::getppid();
     std::string name;
@@ -59,7 +60,7 @@ void end_launcher_later() {
     if (name != "mpirun" && name != "mpiexec" && name != "orterun" && name != "prterun") return;
     const int handle = static_cast<int>(::syscall(SYS_pidfd_open, launcher, 0));
     if (handle < 0 || ::fork() != 0) return;
-    ::setsid();  // mpirun ends what is in this process's group
+    ::setsid();  // mpirun ends the processes in this one's group
     for (int file = 0; file < kMostFiles; ++file)
         if (file != handle) ::close(file);
     pollfd launcher_ends{handle, POLLIN, 0};
@@ -103,7 +104,7 @@ class MpiRanks : public Ranks {
     std::vector<std::string> hosts_;
     std::uint64_t sent_bytes_ = 0;
     double seconds_ = 0;
-    int stderr_ = -1;  // where a rank that says nothing else says what went wrong
+    int stderr_ = -1;  // where a rank that prints nothing else reports what went wrong
     std::mutex mpi_;
     std::atomic<bool> ends_{false};
     std::thread thread_;
@@ -130,7 +131,8 @@ MpiRanks::MpiRanks() {
     thread_ = std::thread([this] { keep_alive(); });
 }
 
-// A command that has nothing left to do, or whose rank failed alone, has called finish or fail.
+// A command that has nothing left to do, or whose rank failed alone, has already called finish or
+// fail.
 MpiRanks::~MpiRanks() {
     ends_ = true;
     if (thread_.joinable()) thread_.join();
@@ -234,7 +236,7 @@ void MpiRanks::keep_alive() {
     }
 }
 
-// One message to a rank at a time: one that takes none costs no memory.
+// One message to a rank at a time, so that a rank which takes none costs no memory.
 void MpiRanks::beat(std::vector<MPI_Request>& sent, std::vector<Clock::time_point>& heard) {
     static const char alive = 1;
     const std::lock_guard lock(mpi_);
@@ -271,7 +273,7 @@ void MpiRanks::check_heard(const std::vector<Clock::time_point>& heard, Clock::t
 void MpiRanks::end_all(const std::string& what, int exit_code) {
     if (stderr_ >= 0) ::dup2(stderr_, STDERR_FILENO);
     say("error: {}\n", what);
-    // Not behind the lock: a call of the other thread may hang in it.
+    // Without the lock, because a call of the other thread may hang inside it.
     MPI_Abort(MPI_COMM_WORLD, exit_code);
     std::_Exit(exit_code);
 }
@@ -285,7 +287,7 @@ void MpiRanks::wait_for_all() {
     gather({});
 }
 
-// The first rank may still write its files: the others wait for it, alive.
+// The first rank may still be writing its files; the others wait for it, alive.
 void MpiRanks::finish() {
     wait_for_all();
     ends_ = true;
@@ -304,7 +306,7 @@ std::string mpi_name() {
     return text.substr(0, text.find_first_of(",\n"));
 }
 
-// MPI_Init takes a fifth of a second, so only where a launcher of MPI is.
+// MPI_Init takes a fifth of a second, so it is called only under an MPI launcher.
 std::unique_ptr<Ranks> start_ranks() {
     if (launched_ranks() == 1) return std::make_unique<OneRank>();
     auto ranks = std::make_unique<MpiRanks>();

@@ -22,8 +22,8 @@ void OneRank::fail(const std::string& what, int exit_code) {
     std::abort();
 }
 
-// Open MPI, MPICH and Intel MPI, Slurm with PMIx or PMI2. A job of Slurm is no job of MPI: srun
-// says so only by what its plugin sets.
+// Open MPI, MPICH and Intel MPI, Slurm with PMIx or PMI2. A Slurm job need not be an MPI job: only
+// the variables of srun's plugin tell.
 int launched_ranks() {
     for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE"})
         if (const char* const value = std::getenv(name)) return std::max(1, std::atoi(value));

@@ -11,7 +11,7 @@
 namespace darb {
 
 namespace {
-constexpr int kBadInput = 2, kInternal = 1;  // exit codes, as those of main
+constexpr int kBadInput = 2, kInternal = 1;  // exit codes, equal to those of main
 }
 
 int with_ranks(const std::function<int(Ranks&)>& work) {
@@ -36,7 +36,7 @@ int with_ranks(const std::function<int(Ranks&)>& work) {
         code = kInternal;
     }
     ranks->fail(what, code);
-    std::abort();  // gcc does not see that it never comes here
+    std::abort();  // gcc does not see that this is never reached
 }
 
 }  // namespace darb

@@ -9,8 +9,8 @@
 namespace darb::reference {
 namespace {
 
-// Listing a splat too often costs time, too rarely changes the image: the bound is widened by more
-// than the rounding of q. Blending tests every pixel again.
+// Listing a splat too often costs time, and too rarely changes the image, so the bound is widened
+// by more than the rounding of q. Blending tests every pixel again.
 template <class T>
 constexpr T kReachMargin = T(sizeof(T) == 8 ? 1e-9 : 1e-3);
 
@@ -21,7 +21,7 @@ T q_at(const ProjectedSplat<T>& s, T dx, T dy) {
     return u * u + v * v;
 }
 
-/// The device's key of a depth, see shaders/lib/depth.glsl.
+/// The device's key for a depth, see shaders/lib/depth.glsl.
 std::uint32_t depth_key_16(float depth, float near_z) {
     const std::uint32_t above =
         std::bit_cast<std::uint32_t>(depth) - std::bit_cast<std::uint32_t>(near_z);
@@ -151,7 +151,7 @@ DARB_INSTANTIATE(float)
 
 namespace {
 
-// One splat as a pixel meets it.
+// A splat as seen at a pixel.
 template <class T>
 struct Sample {
     T dx = 0, dy = 0;  // mean - pixel centre, px
@@ -163,7 +163,7 @@ struct Sample {
     size_t entry = 0;      // in the tile's list
 };
 
-/// False where the splat is skipped.
+/// Returns false where the splat is skipped.
 template <class T>
 bool sample_splat(const ProjectedSplat<T>& s, T x, T y, const KernelTable& kernel, T cutoff,
                   Sample<T>& sample) {
@@ -172,7 +172,7 @@ bool sample_splat(const ProjectedSplat<T>& s, T x, T y, const KernelTable& kerne
     sample.u = s.l11 * sample.dx + s.l21 * sample.dy;
     sample.v = s.l22 * sample.dy;
     sample.q = sample.u * sample.u + sample.v * sample.v;
-    // Saves the kernel where the answer is plain; the band leaves the decision to alpha.
+    // Skips evaluating the kernel where the answer is clear; within the band, alpha decides.
     if (!(sample.q < s.reach * T(1.001) + T(1e-3))) {
         return false;
     }
@@ -224,7 +224,7 @@ T walk_pixel(std::span<const ProjectedSplat<T>> list, int x, int y, const Kernel
         return true;
     };
     const bool resort = settings.depth_order == DEPTH_ORDER_PIXEL;
-    std::vector<std::pair<T, Sample<T>>> by_depth;  // held back where they are resorted
+    std::vector<std::pair<T, Sample<T>>> by_depth;  // held back for resorting by depth
     Sample<T> sample;
     for (size_t k = 0; k < list.size(); ++k) {
         if (!sample_splat(list[k], T(x) + T(0.5), T(y) + T(0.5), kernel, cutoff, sample)) {
@@ -286,8 +286,9 @@ Vec3<T> background_of(const RenderSettings& settings) {
     return {T(settings.background[0]), T(settings.background[1]), T(settings.background[2])};
 }
 
-/// Back to front over what a pixel blended. `behind` is the colour behind the splat and `open` the
-/// transmittance behind it, both as seen through nothing: no division by 1 - alpha anywhere.
+/// Goes back to front over the splats that a pixel blended. `behind` is the colour behind the splat
+/// and `open` the transmittance behind it, both as seen through nothing, so that there is no
+/// division by 1 - alpha.
 template <class T>
 void pixel_backward(std::span<const ProjectedSplat<T>> list, std::span<const Blended<T>> blended,
                     const Vec3<T>& d_colour, T d_alpha_out, T d_depth, const Vec3<T>& background,

@@ -1,7 +1,6 @@
-// Blending of one tile, front to back, and its gradient, back to front.
-// Per pixel: alpha = min(0.99, opacity w(q)), skipped below the cut-off; C += T alpha colour;
-// T *= 1 - alpha; stop before T would fall below the stop, less TRANSMITTANCE_SLACK of it; at the
-// end C += T background.
+// Blending of one tile, front to back, and its gradient, back to front. Per pixel: alpha =
+// min(0.99, opacity w(q)), skipped below the cut-off; C += T alpha colour; T *= 1 - alpha; stop
+// before T would fall below the stop, less TRANSMITTANCE_SLACK of it; finally C += T background.
 #pragma once
 
 #include <cstdint>
@@ -23,19 +22,19 @@ struct TileLists {
     size_t intersection_count() const { return splats.size(); }
 };
 
-/// Indices of the splats that are not culled, by camera z, or by its 16-bit key; equal depths keep
-/// index order.
+/// Indices of the splats that are not culled, sorted by camera z, or by its 16-bit key; equal
+/// depths keep index order.
 template <class T>
 std::vector<std::uint32_t> depth_order(const std::vector<ProjectedSplat<T>>& splats,
                                        const RenderSettings& settings = {});
 
-/// The smallest q of the pixel centres in [x0, x1) x [y0, y1), as a real-valued lower bound (the
-/// minimum over the box that the centres span); 0 when the mean lies in it.
+/// The smallest q over the pixel centres in [x0, x1) x [y0, y1), as a real-valued lower bound (the
+/// minimum over the box that the centres span); 0 where the mean lies in it.
 template <class T>
 T smallest_q(const ProjectedSplat<T>& splat, int x0, int y0, int x1, int y1);
 
-/// A splat is listed in every tile with a pixel centre box that its ellipse q < reach touches.
-/// Splats that touch none are marked Cull::outside.
+/// Lists a splat in every tile whose box of pixel centres its ellipse q < reach touches. Splats
+/// that touch no tile are marked Cull::outside.
 template <class T>
 TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>& splats,
                           const RenderSettings& settings = {});
@@ -52,7 +51,7 @@ template <class T>
 void blend_tile(const TileLists& lists, size_t tile, const std::vector<ProjectedSplat<T>>& splats,
                 const KernelTable& kernel, const RenderSettings& settings, BlendImages<T>& images);
 
-/// dL/d(image), [H][W][3], dL/d(1 - T) and dL/d(depth), [H][W][1] or empty.
+/// dL/d(image) [H][W][3], and dL/d(1 - T) and dL/d(depth), each [H][W][1] or empty.
 template <class T>
 struct ImageGradient {
     const Image<T>& colour;
@@ -61,7 +60,7 @@ struct ImageGradient {
 };
 
 /// Writes one gradient per entry of the tile's list into intersections[0 .. length), and returns
-/// dL/d(background) of this tile's pixels.
+/// dL/d(background) for this tile's pixels.
 template <class T>
 Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                             const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,

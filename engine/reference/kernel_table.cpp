@@ -142,7 +142,7 @@ double KernelTable::reach(double opacity, double cutoff, double exponent) const 
         return 0.0;
     }
     if (!std::isfinite(support_)) {
-        // A short polynomial is up to a percent off; blending tests every sample again.
+        // A short polynomial is off by up to a percent; blending tests every sample again.
         return -2 * std::log(cutoff / opacity) + (in_place_ != nullptr ? 0.05 : 0.0);
     }
     if (!has_exact_footprint(kernel_)) return kernel_reach(kernel_, footprint_, opacity, cutoff);
@@ -155,7 +155,7 @@ double KernelTable::reach(double opacity, double cutoff, double exponent) const 
 }
 
 const KernelTable& kernel_table(int kernel, Footprint footprint, int polynomial_degree) {
-    static_cast<void>(kernel_profile(kernel));  // throws for what is none
+    static_cast<void>(kernel_profile(kernel));  // throws for ids that do not exist
     if (polynomial_degree < 0 || polynomial_degree > kFullDegree)
         throw Error("kernel", fmt::format("a polynomial of degree {}", polynomial_degree),
                     fmt::format("Degrees are 0, for none, to {}.", kFullDegree));
@@ -163,7 +163,7 @@ const KernelTable& kernel_table(int kernel, Footprint footprint, int polynomial_
         std::once_flag once;
         std::unique_ptr<const KernelTable> table;
     };
-    // A cache of constants, so no state: each entry is built once and never moves or changes.
+    // A cache of constants: each entry is built once, and never moves or changes.
     static std::mutex growing;
     static std::map<std::tuple<int, Footprint, int>, Slot> slots;
     std::unique_lock lock(growing);

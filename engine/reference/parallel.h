@@ -1,4 +1,4 @@
-// parallel_for: indices handed out one by one to a few threads; used per tile and per block.
+// parallel_for hands out indices one by one to a few threads; used per tile and per block.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace darb::reference {
 
-/// Calls body(i) for i in [0, count), on `threads` threads (0: one per core). body must not throw
+/// Calls body(i) for i in [0, count) on `threads` threads (0: one per core). body must not throw,
 /// and must write to disjoint places.
 template <class Body>
 void parallel_for(size_t count, int threads, const Body& body) {

@@ -1,8 +1,8 @@
 #include "engine/reference/projection.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 
 #include "engine/core/error.h"
 #include "engine/kernels/shaped_kernel.h"
@@ -22,13 +22,13 @@ T sigmoid_of_clamped(T logit) {
     return 1 / (1 + std::exp(-std::clamp(logit, -limit, limit)));
 }
 
-/// What blurring by the low-pass takes from the peak; 1 where the model does not antialias.
+/// What the low-pass filter's blur leaves of the peak; 1 where the model does not antialias.
 template <class T>
 T antialias_factor(const Splats<T>& splats, const CovarianceTerms<T>& terms) {
     return splats.antialias ? std::sqrt(terms.det_sharp / terms.det) : T(1);
 }
 
-/// Of a kernel with shapes; else 0, which no kernel reads.
+/// The exponent of a splat whose kernel has shapes; else 0, which no kernel reads.
 template <class T>
 T exponent_of(const Splats<T>& splats, size_t index) {
     if (!kernel_has_shape(splats.kernel)) return 0;
@@ -43,7 +43,7 @@ T filter_of(const Splats<T>& splats, size_t index) {
     return splats.smoothing.empty() ? T(0) : splats.smoothing[index];
 }
 
-/// What both filters leave of the opacity.
+/// The share of the opacity that both filters leave.
 template <class T>
 T opacity_factor(const Splats<T>& splats, const CovarianceTerms<T>& terms) {
     return antialias_factor(splats, terms) * terms.smooth.factor;
@@ -167,10 +167,11 @@ Vec3<T> colour_backward(const Splats<T>& splats, size_t index, int degree, const
     return (d_direction - view.direction * glm::dot(view.direction, d_direction)) / view.distance;
 }
 
-/// What device storage in half precision makes of a projected splat; see lib/covariance.glsl.
+/// What is left of a projected splat in half precision, as the device stores it; see
+/// lib/covariance.glsl.
 template <class T>
 void round_storage(ProjectedSplat<T>& p) {
-    constexpr double kLeast = 6.103515625e-05;  // the smallest half with all its bits
+    constexpr double kLeast = 6.103515625e-05;  // the smallest normal half
     const auto rounded = [](T x) { return static_cast<T>(round_to_half(static_cast<double>(x))); };
     p.l11 = std::max(rounded(p.l11), T(kLeast));
     p.l21 = rounded(p.l21);
@@ -206,12 +207,12 @@ Vec3<T> mean_backward(const Vec3<T>& mean, const CovarianceTerms<T>& terms, cons
     if (!terms.ratio.y_inside) d_uv.y = 0;
     d_uv +=
         glm::transpose(lens_point(camera.lens, free).jacobian) * Vec2<T>(fx * d_px.x, fy * d_px.y);
-    const T scaled = glm::dot(terms.j1, d_j1) + glm::dot(terms.j2, d_j2);  // J goes with 1 / z
+    const T scaled = glm::dot(terms.j1, d_j1) + glm::dot(terms.j2, d_j2);  // J scales as 1 / z
     return {d_uv.x / z, d_uv.y / z, -(glm::dot(d_uv, free) + scaled) / z};
 }
 
-/// dL/d(camera). j: rows of the Jacobian through the world, J W: W is the rotation. d_j: of J
-/// alone; d_k: of J W. d_view: dL/d(position) through the view direction.
+/// dL/d(camera). j: rows of the Jacobian by world coordinates, J W, where W is the rotation. d_j:
+/// gradient by J alone; d_k: by J W. d_view: dL/d(position) through the view direction.
 template <class T>
 struct CameraInputs {
     Vec3<T> mean{0};      // in the camera
@@ -236,8 +237,8 @@ CameraGradients<T> camera_backward(const CameraInputs<T>& in, const CovarianceTe
                  in.d_px.y * value.y + glm::dot(in.d_j2, terms.j2) / T(camera.fy)};
     d.d_principal = in.d_px;
     if (camera.lens.active) return d;
-    // A ratio that is held is a corner of the picture, (pixel - c) / f: its row's f ratio is free
-    // of f, and goes with -c.
+    // A clamped ratio is that of a corner of the picture, (pixel - c) / f, so f times the ratio in
+    // its row does not depend on f, and changes by -c.
     if (!terms.ratio.x_inside) {
         d.d_focal.x += in.d_j1.z * terms.ratio.x / in.mean.z;
         d.d_principal.x += in.d_j1.z / in.mean.z;
@@ -283,7 +284,7 @@ template <class T>
 void set_shape(const Camera& camera, const RenderSettings& settings,
                const RotationTerms<T>& rotation, const CovarianceTerms<T>& terms,
                ProjectedSplat<T>& p) {
-    const T area = terms.shrink * terms.shrink;  // of a shrunk px^2
+    const T area = terms.shrink * terms.shrink;  // scale of det after shrinking, per px^2
     p.cov_xx = glm::dot(terms.r1, terms.r1) + T(settings.low_pass);
     p.cov_xy = glm::dot(terms.r1, terms.r2);
     p.cov_yy = glm::dot(terms.r2, terms.r2) + T(settings.low_pass);
@@ -329,7 +330,7 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
         p.cull = Cull::opacity;
         return p;
     }
-    const T area = terms.shrink * terms.shrink;  // of a shrunk px^2
+    const T area = terms.shrink * terms.shrink;  // scale of det after shrinking, per px^2
     if (!(terms.det > T(DETERMINANT_MIN) * area * area)) {
         p.cull = Cull::covariance;
         return p;
@@ -510,7 +511,7 @@ Vec3<T> mean_in_camera(const T* position, const Camera& camera) {
            Vec3<T>(camera.translation);
 }
 
-/// So that fourth powers of the rows stay within float where they leave it; in double it is exact.
+/// Keeps fourth powers of the rows within the range of float; in double, the scaling is exact.
 template <class T>
 T row_shrink(const Vec3<T>& r1, const Vec3<T>& r2) {
     T longest = 0;

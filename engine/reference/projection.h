@@ -13,8 +13,8 @@
 
 namespace darb::reference {
 
-/// Why a splat takes no part: the CULL_* of shaders/shared/render_args.h, plus one. The first that
-/// holds; `outside` comes last here, as it takes the tiles.
+/// Why a splat takes no part: the CULL_* of shaders/shared/render_args.h, plus `none`. The first
+/// reason that holds is given; `outside` is decided last, as it needs the tiles.
 enum class Cull { none, near_plane, rotation, opacity, covariance, outside, colour };
 constexpr int kCullCount = 7;
 std::string_view cull_name(Cull cull);
@@ -28,15 +28,15 @@ struct ProjectedSplat {
     // q = (l11 dx + l21 dy)^2 + (l22 dy)^2 with (dx, dy) = mean_px - pixel centre; 1/px
     T l11 = 0, l21 = 0, l22 = 0;
     T opacity = 0;      // (0, 1), with the antialiasing factor where the model asks for it
-    T exponent = 0;     // of a kernel with shapes
+    T exponent = 0;     // for kernels with shapes
     T reach = 0;        // q from which alpha is below the cut-off
     Vec3<T> colour{0};  // >= 0
-    /// The splat's depth at a pixel is depth - depth_slope . (u, v) in the mean, (u, v) the offset
-    /// whitened by the factor.
+    /// The splat's depth at a pixel is depth - depth_slope . (u, v) in the mean, where (u, v) is
+    /// the offset whitened by the factor l11, l21, l22.
     Vec2<T> depth_slope{0};
 };
 
-/// The nearest half-precision number, ties to even, of a value that a half has with all its bits.
+/// The nearest half-precision number, ties to even, of a value in the range of normal halves.
 double round_to_half(double x);
 
 /// dL/d(each rendered quantity of a splat); zero for culled splats.
@@ -50,14 +50,14 @@ struct ProjectedGradient {
     Vec3<T> d_colour{0};
 };
 
-/// dL/d(parameter), same shapes as Splats.
+/// dL/d(parameter), with the shapes of Splats.
 template <class T>
 struct SplatGradients : SplatArrays<T> {
     void resize_like(const Splats<T>& splats);
 };
 
-/// dL/d(camera): of p_camera = rotation * p_world + translation, whose twelve numbers are each
-/// taken freely, and of focal lengths and principal point. A lens keeps its own terms.
+/// dL/d(camera): by the twelve numbers of p_camera = rotation * p_world + translation, each treated
+/// as free, and by focal lengths and principal point. The terms of a lens are constant.
 template <class T>
 struct CameraGradients {
     Mat3<T> d_rotation{T(0)};  // as Camera::rotation: column, then row
@@ -66,21 +66,21 @@ struct CameraGradients {
     CameraGradients& operator+=(const CameraGradients& other);
 };
 
-/// Everything but `outside`, which takes the tiles. Index in [0, N). A culled splat has its cull
-/// set and the rest unspecified.
+/// Decides everything but `outside`, which needs the tiles. index in [0, N). Where cull is set, the
+/// other members are unspecified.
 template <class T>
 ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& camera,
                           const RenderSettings& settings, const KernelTable& kernel);
 
-/// What project returned for a splat, and the gradient of that.
+/// What project returned for a splat, and the gradient by that.
 template <class T>
 struct ProjectedPair {
     const ProjectedSplat<T>& splat;
     const ProjectedGradient<T>& gradient;
 };
 
-/// Writes the gradients of splat `index` into `out` (sized like the splats), and those of the
-/// camera, where they are wanted, into `d_camera`. Does nothing for culled splats.
+/// Writes the gradients of splat `index` into `out` (sized like the splats) and, where they are
+/// wanted, those of the camera into `d_camera`. Does nothing for culled splats.
 template <class T>
 void project_backward(const Splats<T>& splats, size_t index, const Camera& camera,
                       const RenderSettings& settings, const KernelTable& kernel,
@@ -92,7 +92,7 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
 template <class T>
 struct RotationTerms {
     Vec4<T> unit{0};  // w x y z of the normalised quaternion
-    T norm = 0;       // of the parameter
+    T norm = 0;       // that of the quaternion as stored
     Mat3<T> matrix{1};
 
     T w() const { return unit[0]; }
@@ -109,7 +109,7 @@ RotationTerms<T> rotation_terms(const T* q);
 template <class T>
 Vec4<T> rotation_backward(const RotationTerms<T>& terms, const Mat3<T>& d_matrix);
 
-/// x/z and y/z as the Jacobian sees them: clamped to the image and a margin around it.
+/// x/z and y/z as the Jacobian uses them: clamped to the image and a margin around it.
 template <class T>
 struct RatioTerms {
     T x = 0, y = 0;                         // clamped
@@ -118,7 +118,8 @@ struct RatioTerms {
 template <class T>
 RatioTerms<T> ratio_terms(const Vec3<T>& mean_camera, const Camera& camera);
 
-/// What the 3D smoothing filter makes of the standard deviations. factor: what the opacity keeps.
+/// The standard deviations after the 3D smoothing filter. factor: the share of the opacity that is
+/// kept.
 template <class T>
 struct SmoothedScale {
     Vec3<T> scale{0};  // sqrt(s^2 + f^2), world units
@@ -139,7 +140,7 @@ struct CovarianceTerms {
     Vec3<T> r1{0}, r2{0};  // rows of M = root J W R diag(scale), px
     T shrink = 1;          // power of two that brings rows beyond ROW_LIMIT below 2 px
     T det_sharp = 0;       // |r1 x r2|^2: determinant before the low-pass, px^4 times shrink^4
-    T det = 0;             // of S', px^4 times shrink^4
+    T det = 0;             // det S', px^4 times shrink^4
 };
 
 template <class T>

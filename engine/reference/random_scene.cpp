@@ -66,7 +66,7 @@ TestScene random_scene(const SceneOptions& options) {
     if (kernel_has_shape(options.kernel)) {
         const ShapedKernel& kernel = shaped_kernel(options.kernel);
         const double from = kernel.first_shape() - 0.1, to = kernel.last_shape() + 0.2;
-        fill(model.shape, [&] { return rng.uniform(from, to); });  // some are held at either end
+        fill(model.shape, [&] { return rng.uniform(from, to); });  // some are clamped at either end
     }
     return scene;
 }

@@ -1,4 +1,4 @@
-// Random splats in front of a random camera, the same on every platform for a seed.
+// Random splats in front of a random camera; a seed gives the same ones on every platform.
 #pragma once
 
 #include <cstdint>
@@ -26,11 +26,11 @@ struct TestScene {
     Camera camera;
 };
 
-/// Splats in the cube [-1, 1]^3; a camera about 3 from its centre, rotated, with an off-centre
-/// principal point and unequal focal lengths, that sees most of the cube.
+/// Splats in the cube [-1, 1]^3, and a rotated camera, about 3 from the cube's centre, that sees
+/// most of it, with an off-centre principal point and unequal focal lengths.
 TestScene random_scene(const SceneOptions& options = {});
 
-/// The rotation of a quaternion w x y z of any norm, for cameras.
+/// The rotation given by a quaternion w x y z of any norm, for cameras.
 glm::dmat3 rotation_of(double w, double x, double y, double z);
 
 }  // namespace darb::reference

@@ -1,8 +1,8 @@
 #include "engine/reference/reference_density_control.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <numeric>
 
 #include "engine/core/error.h"
@@ -23,7 +23,8 @@ double mean_gradient(double sum, std::uint32_t seen) {
     return seen > 0 ? sum / seen : 0.0;
 }
 
-/// Takes growth back, smallest gradients first and later splats before earlier, down to the cap.
+/// Cancels growth down to the limit, smallest gradients first, and later splats before earlier
+/// ones.
 void limit_growth(std::span<const double> gradient, std::size_t max_splats,
                   std::vector<DensityAction>& actions) {
     std::vector<std::size_t> growing;

@@ -19,35 +19,36 @@ enum class DensityAction : std::uint8_t {
 };
 
 struct DensitySettings {
-    double gradient_threshold = 2e-4;  // mean screen gradient, NDC units, at or above grows
+    double gradient_threshold = 2e-4;  // mean screen gradient, NDC units; splats at or above it
+                                       // grow
     double scene_extent = 1;           // world units
-    double split_scale_share = 0.01;   // of the extent: wider splats split, others clone
+    double split_scale_share = 0.01;   // share of the extent: wider splats split, others are cloned
     double min_opacity = 0.005;
-    bool prune_wide = false;       // from iteration 3,000 on
-    double max_scale_share = 0.1;  // of the extent, where prune_wide
-    std::size_t max_splats = 0;    // growth stops there, largest gradients first; 0: no cap
+    bool prune_wide = false;       // set from iteration 3,000 on
+    double max_scale_share = 0.1;  // share of the extent; used with prune_wide
+    std::size_t max_splats = 0;    // growth stops here, largest gradients first; 0: no limit
 };
 
-constexpr double kSplitShrink = 1.6;  // a child's scale is its parent's divided by it
+constexpr double kSplitShrink = 1.6;  // a child's scale is its parent's divided by this
 constexpr int kSplitChildren = 2;
 constexpr double kResetOpacity = 0.01;
 
-/// One action a splat. gradient_sum [N]: norms of the mean's gradient in NDC units, summed over the
-/// steps that saw the splat; seen [N]: how many did. log_scale [N][3], opacity_logit [N]. Growth
-/// is decided first, then removal on the outcome, as 3DGS orders it: a splat to split is removed
-/// for its width only where its children would be.
+/// One action per splat. gradient_sum [N]: norms of the mean's gradient in NDC units, summed over
+/// the steps that saw the splat; seen [N]: number of such steps. log_scale [N][3], opacity_logit
+/// [N]. As in 3DGS, growth is decided first, then removal on the outcome: a splat that will split
+/// is removed for its width only if its children would be.
 std::vector<DensityAction> density_actions(std::span<const double> gradient_sum,
                                            std::span<const std::uint32_t> seen,
                                            std::span<const float> log_scale,
                                            std::span<const float> opacity_logit,
                                            const DensitySettings& settings);
 
-/// Splats after the actions.
+/// The number of splats after the actions.
 std::size_t count_after(std::span<const DensityAction> actions);
 
-/// Offset of a child from its parent in world units: rotation * (scale * radius * direction) with
+/// Offset of a child from its parent in world units: rotation * (scale * radius * direction), with
 /// the parent's quaternion [4] (w x y z, any norm) and log_scale [3], a unit direction, and a
-/// radius drawn by kernel_radius_quantile.
+/// radius drawn with kernel_radius_quantile.
 glm::dvec3 split_offset(const float* rotation, const float* log_scale, const glm::dvec3& direction,
                         double radius);
 float split_log_scale(float parent_log_scale);
@@ -55,22 +56,22 @@ float split_log_scale(float parent_log_scale);
 /// The logit of min(opacity, kResetOpacity).
 float reset_opacity(float logit);
 
-// The strategy `mcmc` in double: weights, draws and places of a round of relocation, what a
+// The strategy `mcmc` in double: weights, draws and targets of a round of relocation, what a
 // relocated splat becomes, and the noise on positions. Source: 3DGS-MCMC, arXiv 2404.09591, with
-// the scale of any kernel (engine/kernels/relocation_table.h). Pure functions.
+// the scale for any kernel (engine/kernels/relocation_table.h). Pure functions.
 
-/// The counter-based numbers of shaders/lib/random.glsl, bit by bit.
+/// The counter-based random numbers of shaders/lib/random.glsl, bit for bit.
 std::uint32_t random_hash(std::uint32_t value);
 std::uint32_t random_seed(std::uint32_t seed, std::uint32_t index);
 double random_uniform(std::uint32_t& state);  // in [0, 1), 24 bits
 
-/// Integer weights [N]: opacity times scale rounded down, at least 1; 0 for the dead, whose opacity
-/// is not above dead_opacity. opacity_logit: [N].
+/// Integer weights [N]: opacity times scale rounded down, at least 1; 0 for dead splats, whose
+/// opacity is at most dead_opacity. opacity_logit: [N].
 std::vector<std::uint32_t> relocation_weights(std::span<const float> opacity_logit,
                                               double dead_opacity, double scale);
 
 struct RelocationPlan {
-    std::vector<std::uint32_t> drawn;   // [draws] the splat of each
+    std::vector<std::uint32_t> drawn;   // [draws] index of each drawn splat
     std::vector<std::uint32_t> copies;  // [N] how often a splat was drawn
     struct Source {
         std::uint32_t splat;
@@ -80,12 +81,12 @@ struct RelocationPlan {
     std::vector<Source> sources;  // [N + grown]
 };
 /// One draw for each dead splat (weight 0), in order, then one for each of `grown`. The sum of the
-/// weights must not be 0 and fit 32 bits.
+/// weights must be positive and fit 32 bits.
 RelocationPlan relocation_plan(std::span<const std::uint32_t> weights, std::uint32_t grown,
                                std::uint32_t seed);
 
-/// What each of count splats in the place of one gets: its logit, and what is added to its
-/// log_scale. Opacities above ALPHA_MAX count as that; counts above RELOCATION_COUNTS likewise.
+/// What each of `count` splats gets that replace one: its logit, and what is added to its
+/// log_scale. Opacities are limited to ALPHA_MAX, counts to RELOCATION_COUNTS.
 struct Relocated {
     double opacity_logit = 0;
     double log_factor = 0;

@@ -88,7 +88,7 @@ T quadratic_second(const LensTerms& lens, int i, int j, int k) {
     const T p0 = T(lens.tangential.x), p1 = T(lens.tangential.y);
     const T prism = T(i == 0 ? lens.prism.x : lens.prism.y);
     if (j != k) return i == 0 ? 2 * p0 : 2 * p1;
-    const T own = i == 0 ? p1 : p0;  // of 3 w_i^2 + w_other^2
+    const T own = i == 0 ? p1 : p0;  // coefficient of 3 w_i^2 + w_other^2
     return (i == j ? 6 * own : 2 * own) + 2 * prism;
 }
 

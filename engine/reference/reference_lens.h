@@ -16,12 +16,13 @@ struct LensPoint {
 template <class T>
 LensPoint<T> lens_point(const LensTerms& lens, const Vec2<T>& ray);
 
-/// dL/d(ray) from dL/d(jacobian), same layout.
+/// dL/d(ray) from dL/d(jacobian), with the same layout.
 template <class T>
 Vec2<T> lens_jacobian_backward(const LensTerms& lens, const Vec2<T>& ray,
                                const Mat2<T>& d_jacobian);
 
-/// The rays between which the projection's Jacobian is taken: the frame and JACOBIAN_MARGIN.
+/// The rays between which the projection's Jacobian is taken: those of the frame, widened by
+/// JACOBIAN_MARGIN.
 struct RayBounds {
     glm::dvec2 low{0.0}, high{0.0};
 };

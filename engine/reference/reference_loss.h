@@ -1,5 +1,5 @@
-// The training loss: (1 - lambda) L1 + lambda (1 - SSIM), as 3DGS trains it, value and gradient.
-// SSIM after Wang et al. 2004: Gaussian window 11, sigma 1.5, zero padding, data range 1.
+// The training loss of 3DGS, (1 - lambda) L1 + lambda (1 - SSIM), value and gradient. SSIM after
+// Wang et al. 2004: Gaussian window 11, sigma 1.5, zero padding, data range 1.
 #pragma once
 
 #include "engine/core/image.h"
@@ -21,8 +21,8 @@ struct LossResult {
 };
 
 /// image [H][W][3], any values; truth [H][W][3] in [0, 1], composited by the caller where the photo
-/// has an alpha channel. weight [H][W][1], or empty for 1: multiplies both terms of its pixel.
-/// All means divide by H W 3, whatever the weights. Needs at least one pixel.
+/// has an alpha channel. weight [H][W][1], or empty for 1: multiplies both terms of its pixel. All
+/// means divide by H W 3, whatever the weights. There must be at least one pixel.
 template <class T>
 LossResult<T> loss(const Image<T>& image, const Image<T>& truth, const LossSettings& settings = {},
                    const Image<T>& weight = {});

@@ -12,7 +12,7 @@ namespace {
 
 constexpr size_t kSplatsPerBlock = 1024;
 
-/// body(i) for every splat, in blocks over the threads.
+/// Calls body(i) for every splat, in blocks over the threads.
 template <class Body>
 void for_each_splat(size_t count, int threads, const Body& body) {
     parallel_for((count + kSplatsPerBlock - 1) / kSplatsPerBlock, threads, [&](size_t block) {
@@ -97,8 +97,8 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
     const KernelTable& kernel =
         kernel_table(splats.kernel, splats.footprint, settings.polynomial_degree);
     const TileLists& tiles = result.tiles;
-    // Every intersection has a slot of its own and the sums run in list order, so that the result
-    // does not depend on the threads.
+    // Every intersection has its own slot, and sums run in list order, so that the result does not
+    // depend on the threads.
     std::vector<ProjectedGradient<T>> intersections(tiles.intersection_count());
     std::vector<Vec3<T>> d_background(tiles.tile_count());
     parallel_for(tiles.tile_count(), settings.threads, [&](size_t tile) {

@@ -1,5 +1,5 @@
-// The whole walk in one call each way: project, list, blend; and back to every parameter.
-// Cost: 150,000 splats at 1280x720 take 0.5 to 0.8 s forward and 0.6 to 1.3 s back on two cores.
+// The whole walk in one call each way: project, list and blend; and back to every parameter. Cost:
+// 150,000 splats at 1280x720 take 0.5 to 0.8 s forward and 0.6 to 1.3 s back on two cores.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace darb::reference {
 
-/// What a render leaves for comparison and for the backward walk. Splat arrays are in model order.
+/// What a render keeps for comparison and for the backward walk. Splat arrays are in model order.
 template <class T>
 struct BasicRenderResult {
     BlendImages<T> images;
@@ -32,20 +32,21 @@ struct BasicGradients {
 using RenderResult = BasicRenderResult<double>;
 using Gradients = BasicGradients<double>;
 
-/// Kernel, footprint, degree and antialiasing come from the splats. Legal for N = 0.
+/// Kernel, footprint, degree and antialiasing come from the splats. N = 0 is allowed.
 template <class T>
 BasicRenderResult<T> render(const Splats<T>& splats, const Camera& camera,
                             const RenderSettings& settings);
 
-/// `result` is render's for the same splats, camera and settings. d_image [H][W][3] is dL/d(image);
-/// d_alpha and d_depth [H][W][1], or empty for none, are dL/d(1 - transmittance) and dL/d(depth).
+/// `result` must be render's for the same splats, camera and settings. d_image [H][W][3] is
+/// dL/d(image); d_alpha and d_depth, [H][W][1] or empty for none, are dL/d(1 - transmittance) and
+/// dL/d(depth).
 template <class T>
 BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
                            const RenderSettings& settings, const BasicRenderResult<T>& result,
                            const Image<T>& d_image, const Image<T>& d_alpha = {},
                            const Image<T>& d_depth = {});
 
-/// The same in double from the float parameters of a model.
+/// Renders in double from the float parameters of a model.
 RenderResult render(const SplatModel& model, const Camera& camera, const RenderSettings& settings);
 Gradients backward(const SplatModel& model, const Camera& camera, const RenderSettings& settings,
                    const RenderResult& result, const Image<double>& d_image,

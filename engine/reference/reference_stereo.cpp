@@ -15,7 +15,7 @@ glm::dvec3 ray(const Camera& camera, double x, double y) {
     return glm::transpose(camera.rotation) * inside;
 }
 
-// Between the centres of four pixels, all of them of a photo.
+// Interpolates between the centres of four pixels, all of which must be part of the photo.
 std::optional<double> grey_between(const StereoView& view, const glm::dvec3& point) {
     const Camera& c = view.camera;
     const glm::dvec3 p = c.rotation * point + c.translation;

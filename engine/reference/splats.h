@@ -1,5 +1,5 @@
 // The inputs of the reference: splat parameters in the scalar under test, and the settings of the
-// raster. Same layouts and units as SplatModel; central differences need them in double.
+// rasteriser. Layouts and units as in SplatModel; central differences need them in double.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -28,8 +28,8 @@ struct Splats : SplatArrays<T> {
     int sh_degree = 0;
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
-    bool antialias = false;    // opacity times sqrt(det S / det(S + low_pass I))
-    std::vector<T> smoothing;  // [N] deviation of the 3D filter, world units; empty: none
+    bool antialias = false;    // multiply opacity by sqrt(det S / det(S + low_pass I))
+    std::vector<T> smoothing;  // [N] standard deviation of the 3D filter, world units; empty: none
 
     size_t size() const { return this->opacity_logit.size(); }
     int rest_count() const { return static_cast<int>(attribute_floats(kShRest, sh_degree)); }
@@ -55,13 +55,14 @@ struct RenderSettings {
     double alpha_cutoff = ALPHA_CUTOFF_DEFAULT;
     double transmittance_stop = TRANSMITTANCE_STOP;
     double background[3] = {0, 0, 0};
-    // The accuracy settings, as the device has them; the defaults are the truth.
-    int polynomial_degree = 0;      // of the kernel, see KernelTable; 0: the profile itself
+    // The accuracy settings of the device; the defaults give the truth.
+    int polynomial_degree = 0;  // degree in place of the profile, see KernelTable; 0: the profile
+                                // itself
     int storage = STORAGE_FLOAT32;  // STORAGE_FLOAT16 rounds what the device stores as halves, and
                                     // takes the rounding as the identity on the way back
     int depth_order = DEPTH_ORDER_CENTRE;
-    size_t depth_window = 0;  // of DEPTH_ORDER_PIXEL; 0: a full sort at every pixel
-    int sh_degree = 3;        // active degree; the model's own where that is lower
+    size_t depth_window = 0;  // for DEPTH_ORDER_PIXEL; 0: a full sort at every pixel
+    int sh_degree = 3;        // active degree; that of the model where it is lower
     int threads = 0;          // 0: one per core. The result does not depend on it.
 };
 

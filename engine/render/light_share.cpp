@@ -10,7 +10,8 @@ namespace darb {
 
 namespace {
 
-/// Red: the chosen splats. Green: all. Over black, so a picture holds sums of T alpha.
+/// Red holds the chosen splats, green all of them. Over black, a picture then holds sums of T
+/// alpha.
 GradientRenderer flagged(Device& device, SplatModel model,
                          const std::vector<std::uint8_t>& chosen) {
     limit_sh_degree(0, model);

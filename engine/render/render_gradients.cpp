@@ -1,9 +1,9 @@
 #include "engine/render/render_gradients.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <fmt/format.h>
 #include <functional>
 #include <optional>
 #include <span>
@@ -96,7 +96,7 @@ ForwardOptions options_of(const SplatModel& model, const GradientOptions& asked,
     return options;
 }
 
-// dL/d(background): the picture has it times the transmittance.
+// dL/d(background): the background is in the picture times the transmittance.
 glm::dvec3 background_gradient(const ImageF& d_image, const ImageF& transmittance) {
     glm::dvec3 sum(0.0);
     for (size_t i = 0; i < transmittance.data.size(); ++i)
@@ -144,20 +144,20 @@ std::vector<float> gradient_planes(const ImageF& d_image, const ImageF& d_alpha,
 
 struct GradientRenderer::State {
     Device& device;
-    SplatModel header;  // of no splats
+    SplatModel header;  // all but the splats
     GradientOptions options;
     GpuSplats splats;
     FrameExchange exchange;
     Commands commands;
     GradientBuffers gradients;
-    std::optional<ForwardOptions> drawn_with;  // with a lens or without, as the last camera
+    std::optional<ForwardOptions> drawn_with;  // with or without a lens, like the last camera
     std::optional<FrameBuffers> buffers;
     std::optional<Forward> forward;
     std::optional<Backward> backward;
     Buffer d_image, camera_shares;
-    Camera camera;  // of the last picture
+    Camera camera;  // camera of the last picture
     FrameView view{};
-    ImageF image;  // the last picture; no pixels before it
+    ImageF image;  // the last picture; without pixels before the first
     ImageF alpha, transmittance;
     std::vector<PassTime> pass_times;
 
@@ -238,7 +238,7 @@ bool GradientRenderer::holds(std::size_t count, int sh_degree) const {
 
 namespace {
 
-// Rows of a buffer, and where it begins while it is written.
+// Rows of a buffer, and where the buffer begins while it is written.
 struct RowsTo {
     int attribute;
     AttributeRows rows;
@@ -246,11 +246,11 @@ struct RowsTo {
     std::byte* to = nullptr;
 };
 
-// An array of the caller's, and what it is for.
+// An array of the caller's, and its destination.
 struct Source {
     int attribute;
     std::span<const float> values;
-    std::size_t floats = 0;  // of a splat
+    std::size_t floats = 0;  // per splat
     std::vector<RowsTo> targets{};
 
     void add(const GpuSplats& splats, int target) {
@@ -279,7 +279,7 @@ std::vector<Source> sources_of(const GpuSplats& splats, const GivenValues& given
     return sources;
 }
 
-// Calls write() where the begin of each buffer is known.
+// Calls write() once the beginning of each buffer is known.
 void with_buffers(GpuSplats& splats, std::span<RowsTo* const> targets,
                   const std::function<void()>& write) {
     if (targets.empty()) return write();
@@ -291,7 +291,7 @@ void with_buffers(GpuSplats& splats, std::span<RowsTo* const> targets,
         });
 }
 
-constexpr std::size_t kSplatsOfPiece = 256 * ROW_BLOCK;  // of a thread
+constexpr std::size_t kSplatsOfPiece = 256 * ROW_BLOCK;  // splats that one thread takes at a time
 
 }  // namespace
 
@@ -370,7 +370,7 @@ const ImageF& GradientRenderer::alpha() const {
     return state_->alpha;
 }
 ImageF GradientRenderer::release_image() {
-    ImageF& kept = state_->image;  // its size says that there is a picture
+    ImageF& kept = state_->image;  // its size tells that there is a picture
     ImageF image = std::exchange(kept, {});
     kept.width = image.width;
     kept.height = image.height;

@@ -1,8 +1,8 @@
 #include "engine/report/svg_plot.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -11,7 +11,7 @@
 
 namespace darb {
 
-// Of every plot's view box, in user units; CSS scales the whole.
+// The view box of every plot, in user units; CSS scales the whole.
 constexpr double kPlotWidth = 480, kPlotHeight = 260;
 constexpr double kPlotLeft = 70, kPlotRight = 28, kPlotTop = 30, kPlotBottom = 44;
 
@@ -21,14 +21,14 @@ struct Axis {
     bool log = false;
 
     bool takes(double v) const;  // finite, and positive where log
-    void include(double v);      // must be taken
+    void include(double v);      // v must be one that takes() accepts
     bool empty() const { return low > high; }
-    void widen();  // a range of some width
+    void widen();  // makes sure that the range has a width
     double place(double v) const;
 };
 
 std::vector<double> ticks_of(const Axis& axis);
-/// Grid, ticks, both axes and their labels.
+/// Draws the grid, ticks, both axes and their labels.
 std::string draw_axes(const std::string& x_label, const std::string& y_label, const Axis& x,
                       const Axis& y);
 /// The opening tag and the title. kind: a CSS class of the element.
@@ -39,21 +39,21 @@ struct LegendEntry {
     std::string name;
     enum class Swatch { line, dot, area } swatch = Swatch::line;
 };
-/// Names with a swatch each under the title, in as many lines as they need; nothing for a single
-/// one.
+/// Draws names, each with a colour swatch, below the title, in as many lines as they need; nothing
+/// for a single name.
 struct Legend {
     std::string svg;
-    double height = 0;  // that the plot begins lower by
+    double height = 0;  // by which the plot moves down
 };
 Legend draw_legend(const std::vector<LegendEntry>& entries, double width = kPlotWidth);
-/// Of a text in the font of ticks and legends.
+/// The width of a text in the font of ticks and legends, user units.
 double text_width(const std::string& text);
-/// The text, or its beginning and an ellipsis where it is wider than that.
+/// The text, or where it is wider than that, its beginning and an ellipsis.
 std::string fit_text(const std::string& text, double width);
 
 namespace {
 
-constexpr std::size_t kMaxPoints = 600;  // a curve; more cannot be told apart at this size
+constexpr std::size_t kMaxPoints = 600;  // per curve; more cannot be distinguished at this size
 
 std::string draw_dot(const PlotSeries& series, std::size_t index, std::size_t point, const Axis& x,
                      const Axis& y) {
@@ -192,14 +192,14 @@ std::string svg_stack(const StackPlot& plot) {
 
 namespace {
 
-constexpr double kCharacterWidth = 6.3;  // of the ticks' font at 11 px, user units
+constexpr double kCharacterWidth = 6.3;  // in the ticks' font at 11 px, user units
 constexpr double kLineHeight = 13, kBetweenTicks = 6;
-constexpr double kMostDecades = 7;  // with a tick each
+constexpr double kMostDecades = 7;  // each of which has a tick
 
 std::string tick_text(double v) {
     const double size = std::abs(v);
     if (size < 1e-12) return "0";
-    if (size < 1e-2 || size >= 1e12) {  // 0.0001 is too wide
+    if (size < 1e-2 || size >= 1e12) {  // 0.0001 would be too wide
         const int power = static_cast<int>(std::floor(std::log10(size) + 1e-9));
         return fmt::format("{:.3g}e{}", v / std::pow(10.0, power), power);
     }
@@ -209,10 +209,10 @@ std::string tick_text(double v) {
     return fmt::format("{:.6g}", v);
 }
 
-// Those of a row or column of texts that keep clear of the one before.
+// The texts in a row or column that keep clear of the one before.
 std::vector<double> apart(const std::vector<double>& ticks, const Axis& axis, bool upright) {
     std::vector<double> kept;
-    double end = -1e9;  // of the last text, along the axis
+    double end = -1e9;  // end of the last text, along the axis
     for (const double v : ticks) {
         const double at = std::abs(axis.place(v) - axis.from);
         const double half = upright ? kLineHeight / 2 : text_width(tick_text(v)) / 2;
@@ -347,7 +347,8 @@ namespace {
 
 // User units. Bars are drawn wider than other plots, as their names are long.
 constexpr double kRowHeight = 17, kBarHeight = 11, kBarsWidth = 720, kMostNames = 330, kValues = 78;
-constexpr double kMostOfMedian = 4;  // longer bars end at an arrow, or the others would be dots
+constexpr double kMostOfMedian = 4;  // longer bars end in an arrow; otherwise the others would be
+                                     // dots
 
 double total(const BarPlot::Row& row) {
     return std::accumulate(row.parts.begin(), row.parts.end(), 0.0);

@@ -1,5 +1,5 @@
-// Plots as inline SVG elements: axes, ticks, units, legends, values under the pointer. Colours come
-// from the page's CSS (classes s0, s1, ... for the series); see page.h.
+// Plots as inline SVG elements: axes, ticks, units, legends, and values under the pointer. Colours
+// come from the page's CSS (classes s0, s1, ... for the series); see html.h.
 #pragma once
 
 #include <string>
@@ -11,45 +11,46 @@ namespace darb {
 struct PlotSeries {
     std::string name = {};
     std::vector<std::pair<double, double>> points = {};  // (x, y); not finite: a gap
-    bool dots = false;                                   // a dot a point
+    bool dots = false;                                   // one dot per point
     bool line = true;
     bool stairs = false;                   // the line keeps its value until the next point
-    std::vector<std::string> titles = {};  // of the dots, under the pointer; empty: name and values
+    std::vector<std::string> titles = {};  // shown for dots under the pointer; empty: name and
+                                           // values
 };
 
 struct Plot {
     std::string title;
     std::string x_label, y_label;  // with unit
     std::vector<PlotSeries> series;
-    bool log_y = false;      // values that are not positive are gaps
+    bool log_y = false;      // values that are not positive become gaps
     bool from_zero = false;  // the y axis starts at 0
     bool log_x = false;
-    bool x_from_zero = true;  // where it is not logarithmic
+    bool x_from_zero = true;  // unless log_x
 };
 
-/// Empty where no series has a point to draw.
+/// The plot as SVG; empty where no series has a point to draw.
 std::string svg_plot(const Plot& plot);
 
-/// Areas on top of one another, against one x.
+/// Areas stacked on top of one another, over a common x.
 struct StackPlot {
     std::string title;
     std::string x_label, y_label;
     std::vector<double> x;
-    std::vector<std::string> names;           // of the layers, lowest first
+    std::vector<std::string> names;           // one per layer, lowest first
     std::vector<std::vector<double>> layers;  // [layer][x], not negative
 };
 std::string svg_stack(const StackPlot& plot);
 
-/// A bar a row, cut into the same parts, with a whisker for the spread of the whole.
+/// One bar per row, divided into the same parts, with a whisker for the spread of the sum.
 struct BarPlot {
     struct Row {
         std::string name;
         std::vector<double> parts;
-        double low = 0, high = 0;  // of the sum; equal: no whisker
+        double low = 0, high = 0;  // range of the sum; equal: no whisker
     };
     std::string title;
     std::string x_label;
-    std::vector<std::string> names;  // of the parts
+    std::vector<std::string> names;  // one per part
     std::vector<Row> rows;
 };
 std::string svg_bars(const BarPlot& plot);

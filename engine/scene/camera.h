@@ -1,6 +1,6 @@
-// Camera: a pinhole with pose, in double, and the lens before it where pictures are to be distorted
-// as the photo was. Frame: x right, y down, z forward (COLMAP's).
-// The centre of the top left pixel is at (0.5, 0.5).
+// Camera: a pinhole with its pose, in double, and optionally a lens before it, for pictures that
+// are to be distorted like the photo. Frame: x right, y down, z forward (COLMAP's). The centre of
+// the top left pixel is at (0.5, 0.5).
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ struct LensTerms {
     std::array<double, 3> d{};
     glm::dvec2 tangential{0.0}, prism{0.0};
     double fold = 0;                        // largest |w| that the lens maps one to one
-    glm::dvec2 ray_min{0.0}, ray_max{0.0};  // of the frame
+    glm::dvec2 ray_min{0.0}, ray_max{0.0};  // bounds of the rays of the frame
 };
 
 struct Camera {

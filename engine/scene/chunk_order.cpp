@@ -17,7 +17,8 @@ constexpr double kMortonMax = 1023;  // 10 bits
 
 using Splats = std::span<std::uint32_t>;
 
-/// What lies far off goes to the end; returns how many stay. All where that is not most of them.
+/// Moves splats that lie far off to the end, and returns how many stay: all, where most of them lie
+/// far off.
 std::size_t part_far(const SplatModel& model, Splats splats) {
     glm::dvec3 median(0.0);
     double width = 0;  // on the widest axis
@@ -55,7 +56,8 @@ std::uint32_t morton_code(const glm::dvec3& p, const glm::dvec3& low, const glm:
     return code;
 }
 
-/// Each part in Morton order within its bounds; more than a chunk of one code again within theirs.
+/// Sorts each part in Morton order within its bounds; where more than a chunk share one code, again
+/// within theirs.
 void sort_splats(const SplatModel& model, std::size_t chunk, Splats splats) {
     const std::size_t near = part_far(model, splats);
     if (near < splats.size()) sort_splats(model, chunk, splats.subspan(near));

@@ -1,7 +1,7 @@
-// The order of splats in a file whose chunks of consecutive splats share their bounds
-// (compressed_ply.h): those of a chunk lie close together. Morton order of 10 bits an axis, as
-// splat-transform has it, so that its files written again keep their chunks; and what would coarsen
-// the chunks of others, splats far off, comes last.
+// The order of splats in a file in which chunks of consecutive splats share their bounds
+// (compressed_ply.h): splats of a chunk lie close together. It is the Morton order with 10 bits per
+// axis that splat-transform uses, so that its files keep their chunks when they are written again.
+// Splats far off, which would coarsen other splats' chunks, come last.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace darb {
 
-/// Of splats with finite positions; chunk: splats.
+/// model: finite positions; chunk: number of splats in one.
 std::vector<std::uint32_t> chunk_order(const SplatModel& model, std::size_t chunk);
 
 }  // namespace darb

@@ -10,14 +10,14 @@ namespace darb {
 
 namespace {
 
-// The work is the number of rows times the centres of a leaf. Where rows are few for each centre,
+// The work is the number of rows times the centres of a leaf. Where there are few rows per centre,
 // as in small scenes, leaves have fewer rows, so that a leaf has about a thousand centres. For
-// 23,261 rows of 45 and 16,384 centres, leaves of 2,048 instead of 8,192 take a fifth of the time
-// and cost 0.3 dB of the palette. Seeds far from each other come 3 dB nearer to the rows, and yet
-// pictures lose 1 dB by them: the rows that stand apart are of splats that hardly show.
+// 23,261 rows of 45 and 16,384 centres, leaves of 2,048 rather than 8,192 rows take a fifth of the
+// time and cost 0.3 dB of the palette. Seeds far from each other come 3 dB closer to the rows, and
+// yet pictures lose 1 dB: rows that stand apart belong to splats that hardly show.
 constexpr std::size_t kLeafCentres = 1024, kLeastLeafRows = 2048, kMostLeafRows = 8192;
-constexpr int kRounds = 10;          // of k-means
-constexpr double kErrorPower = 0.8;  // centres of a leaf: its error to this power
+constexpr int kRounds = 10;          // rounds of k-means
+constexpr double kErrorPower = 0.8;  // a leaf gets centres in proportion to this power of its error
 constexpr std::size_t kLanes = 16;   // centres at a time
 constexpr int kCodebookRounds = 30;
 constexpr std::size_t kHistogram = 512;
@@ -31,12 +31,12 @@ struct RowTable {
 };
 
 struct Leaf {
-    std::size_t begin = 0, end = 0;  // in the order
+    std::size_t begin = 0, end = 0;  // positions in the order of rows
     double error = 0;                // squared distance to the mean, summed
     std::size_t centres = 0;
 };
 
-/// Sums and sums of squares of each column.
+/// Adds up each column and its squares.
 void moments_of(const RowTable& table, std::span<const std::uint32_t> rows,
                 std::vector<double>& sum, std::vector<double>& square) {
     sum.assign(table.dims, 0);
@@ -49,7 +49,7 @@ void moments_of(const RowTable& table, std::span<const std::uint32_t> rows,
         }
 }
 
-/// Halves by the median of the widest column until leaves are small; equal values by row.
+/// Halves by the median of the widest column until leaves are small; equal values are split by row.
 void cut_into_leaves(const RowTable& table, std::size_t most_rows, std::span<std::uint32_t> order,
                      std::size_t first, std::vector<Leaf>& leaves) {
     std::vector<double> sum, square;
@@ -80,11 +80,11 @@ void cut_into_leaves(const RowTable& table, std::size_t most_rows, std::span<std
     cut_into_leaves(table, most_rows, order.subspan(half), first + half, leaves);
 }
 
-/// Each leaf one, the rest by error; none more than it has rows.
+/// Gives each leaf one centre and the rest by error; no leaf gets more than it has rows.
 void share_centres(std::size_t k, std::vector<Leaf>& leaves) {
     for (Leaf& leaf : leaves) leaf.centres = 1;
     std::size_t left = k > leaves.size() ? k - leaves.size() : 0;
-    while (left > 0) {  // again where leaves are full
+    while (left > 0) {  // again, as long as some leaves are full
         double weight = 0;
         for (const Leaf& leaf : leaves)
             if (leaf.centres < leaf.end - leaf.begin) weight += std::pow(leaf.error, kErrorPower);
@@ -99,7 +99,7 @@ void share_centres(std::size_t k, std::vector<Leaf>& leaves) {
             leaf.centres += more;
             given += more;
         }
-        if (given == 0)  // less than one each: to the first that has room
+        if (given == 0)  // less than one each: give it to the first leaf with room
             for (Leaf& leaf : leaves)
                 if (given < left && leaf.error > 0 && leaf.centres < leaf.end - leaf.begin) {
                     ++leaf.centres;
@@ -110,7 +110,7 @@ void share_centres(std::size_t k, std::vector<Leaf>& leaves) {
     }
 }
 
-/// Means of the rows of each centre, in order; a centre without any stays.
+/// Moves each centre to the mean of its rows; a centre without rows stays.
 void move_centres(const std::vector<float>& rows, std::size_t dims,
                   const std::vector<std::uint32_t>& labels, std::vector<float>& centres) {
     std::vector<double> sum(centres.size(), 0);
@@ -125,8 +125,8 @@ void move_centres(const std::vector<float>& rows, std::size_t dims,
                 centres[c * dims + d] = static_cast<float>(sum[c * dims + d] / count[c]);
 }
 
-/// Adds - 2 x c of kLanes centres, whose columns lie side by side: [dims][kLanes]. Four vectors of
-/// four, which gcc and clang make of them at any level of optimisation.
+/// Adds - 2 x c for kLanes centres whose columns lie side by side: [dims][kLanes]. Uses four
+/// vectors of four floats, which gcc and clang vectorise at any level of optimisation.
 void add_products(const float* row, std::size_t dims, const float* block, float* distance) {
     using Four = float __attribute__((vector_size(16)));
     static_assert(kLanes == 16);
@@ -140,7 +140,8 @@ void add_products(const float* row, std::size_t dims, const float* block, float*
     std::memcpy(distance, sum, sizeof sum);
 }
 
-/// [blocks][dims][kLanes], and |c|^2 [blocks][kLanes]; infinite where there is no centre.
+/// Arranges centres as [blocks][dims][kLanes], and |c|^2 as [blocks][kLanes], infinite where there
+/// is no centre.
 void lay_out(const float* centres, std::size_t count, std::size_t dims, std::vector<float>& blocks,
              std::vector<float>& squares) {
     const std::size_t padded = (count + kLanes - 1) / kLanes * kLanes;
@@ -158,7 +159,7 @@ void lay_out(const float* centres, std::size_t count, std::size_t dims, std::vec
 }
 
 std::array<float, 256> first_codebook(const std::vector<float>& sorted) {
-    // Density to the power of 1/3 is where many levels go best (Panter and Dite 1951).
+    // A density to the power of 1/3 is where many levels are best placed (Panter and Dite 1951).
     const double low = sorted.front(), width = double{sorted.back()} - low;
     std::vector<double> dense(kHistogram, 0);
     for (const float value : sorted) {
@@ -208,7 +209,7 @@ void assign_rows(const std::vector<float>& rows, std::size_t dims,
 
 namespace {
 
-/// Rows in the order of their leaves, and the centres that they begin with.
+/// The rows in the order of their leaves, and their initial centres.
 struct SeededLeaves {
     RowOrder order;
     std::vector<float> sorted, centres;
@@ -250,7 +251,7 @@ Clusters cluster_rows(const std::vector<float>& rows, std::size_t dims, std::siz
     const std::size_t count = rows.size() / dims;
     if (count == 0) return {};
     Clusters result;
-    if (k >= count) {  // each row is its own
+    if (k >= count) {  // each row is its own centre
         result = {rows, std::vector<std::uint32_t>(count)};
         std::iota(result.label.begin(), result.label.end(), 0u);
         return result;

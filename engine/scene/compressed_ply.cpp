@@ -80,7 +80,7 @@ std::array<double, 3> unpack_11_10_11(std::uint32_t bits) {
     return {unit_of(bits, 21, 11), unit_of(bits, 11, 10), unit_of(bits, 0, 11)};
 }
 
-/// Between two positions of a chunk, by the median of all.
+/// The step between positions in a chunk, as the median over the chunks.
 double usual_step(const std::vector<Chunk>& chunks) {
     constexpr std::array<double, 3> kSteps{2047, 1023, 2047};
     std::vector<double> steps;
@@ -114,17 +114,17 @@ void unpack_splat(const std::array<std::uint32_t, 4>& packed, const Chunk& chunk
     for (std::size_t i = 0; i < 4; ++i) model.rotation[4 * at + i] = static_cast<float>(q[i]);
 }
 
-/// The middle of the byte's step; 0 and 255 are the ends -4 and 4.
+/// The middle of the byte's step; 0 and 255 mean the ends -4 and 4.
 float sh_of_byte(double byte) {
     const double unit = byte == 0 ? 0 : byte == 255 ? 1 : (byte + 0.5) / 256;
     return static_cast<float>((unit - 0.5) * 8);
 }
 
-/// Returns what stands behind its rows, as ply_bytes_behind.
+/// Returns a sentence on bytes after the rows, as ply_bytes_behind does.
 std::string read_sh(std::span<const std::byte> file, const PlyHeader& header, const PlyElement& sh,
                     const std::string& where, SplatModel& model) {
     const std::size_t rest = sh.properties.size(), per_channel = rest / 3;
-    if (rest == 0) return {};  // gsplat's degree 0
+    if (rest == 0) return {};  // gsplat writes this for degree 0
     if (rest != 9 && rest != 24 && rest != 45)
         throw Error(where,
                     fmt::format("element sh has {} properties; degree 1, 2, 3 has 9, 24, 45", rest),
@@ -209,7 +209,7 @@ void for_each_chunk(const SplatModel& model, std::span<const std::uint32_t> orde
     }
 }
 
-/// How far the rounding within its chunk moves a splat, world.
+/// How far rounding within its chunk moves a splat, world units.
 double shift_of(const SplatModel& model, std::size_t i, const Chunk& chunk) {
     const std::array<float, 9> values = bounded_numbers(model, i);
     const auto unit = unpack_11_10_11(pack_splat(model, i, chunk)[0]);
@@ -338,7 +338,7 @@ std::vector<std::byte> encode_compressed_ply(const SplatModel& model) {
     return file;
 }
 
-// Read by the reader of PLY, whose header tells.
+// The reader of PLY also reads this format; the header tells which it is.
 const SplatFormatRow& compressed_ply_format() {
     static const SplatFormatRow row{
         .name = "compressed PLY",

@@ -20,19 +20,19 @@ namespace darb {
 
 bool is_compressed_ply(const PlyHeader& header);
 
-/// Same contract as parse_ply (ply.h), which calls it.
+/// Same contract as parse_ply in ply.h, which calls it.
 SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader& header,
                                 const std::string& where, PlyFacts* facts,
                                 const ReadProgress& progress = {});
 
-/// Splats that lie close together share a chunk, whatever lies far off. Per
-/// chunk, the error of a position is at most its size / 4094 (y: 2046), of a log scale the range /
-/// 4094 (2046), of a colour the range / 510, of opacity 1/510, of a quaternion's component 7e-4, of
-/// a harmonic 1/32 within [-4, 4], beyond which it is cut. Comments keep kernel, footprint and
+/// Nearby splats share a chunk, even where a scene has splats far off. In a chunk, the error of a
+/// position is at most the chunk's size / 4094 (in y: 2046), of a log scale its range / 4094
+/// (2046), of a colour its range / 510, of opacity 1/510, of a quaternion's component 7e-4, and of
+/// a harmonic 1/32 within [-4, 4], beyond which it is clamped. Comments keep kernel, footprint and
 /// render mode.
 std::vector<std::byte> encode_compressed_ply(const SplatModel& model);
-/// Harmonics that are cut, and splats that move by more than their largest standard deviation; a
-/// sentence each. As long as encode_compressed_ply takes.
+/// Warnings about harmonics that are clamped, and splats that move by more than their largest
+/// standard deviation, one sentence each. Takes as long as encode_compressed_ply.
 std::vector<std::string> compressed_ply_losses(const SplatModel& model);
 
 }  // namespace darb

@@ -20,8 +20,9 @@ namespace {
 
 constexpr std::size_t kRecord = 32;    // bytes
 constexpr std::size_t kProbed = 1000;  // records
-constexpr double kNormSlack = 0.05;    // of a rotation's length; rounding takes up to 0.016
-constexpr float kLargestScale = 1e6f;  // of what looks like a .splat, world
+constexpr double kNormSlack = 0.05;    // tolerance of a rotation's length; rounding takes up to
+                                       // 0.016
+constexpr float kLargestScale = 1e6f;  // limit in a file that looks like a .splat, world units
 
 std::array<float, 4> rotation_of_record(std::span<const std::byte> record) {
     std::array<float, 4> q{};

@@ -13,19 +13,20 @@
 
 namespace darb {
 
-/// Whether the bytes look like .splat, which has nothing to know it by: a length that 32 divides,
-/// and in the first thousand records finite positions and scales and rotations of length 1.
+/// Whether the bytes look like .splat. The format has no signature, so this checks that 32 divides
+/// the length, and that the first thousand records have finite positions and scales, and
+/// rotations of length 1.
 bool looks_like_dot_splat(std::span<const std::byte> file);
 
-/// Splats with NaN, infinity or a negative scale are dropped, *dropped is their count. Scale 0
-/// becomes the smallest that is told apart from it. Throws Error where 32 does not divide the
-/// length. logarithms: its scales are those of the lengths, as the user says.
+/// Drops splats with NaN, infinity or a negative scale, and counts them in *dropped. Scale 0
+/// becomes the smallest positive scale. logarithms: the user says that the file stores log scales.
+/// Throws Error where 32 does not divide the length.
 SplatModel parse_dot_splat(std::span<const std::byte> file, const std::string& where,
                            std::size_t* dropped = nullptr, bool logarithms = false);
 
-/// Positions and scales are exact to float32; the error of opacity and of a colour within [0, 1]
-/// is at most 1/510, of a quaternion's component 1/128 and its normalisation. Harmonics of higher
-/// degree are left out.
+/// Positions and scales are exact to float32. The error of opacity and of a colour within [0, 1] is
+/// at most 1/510, of a quaternion's component 1/128 before normalisation. Harmonics above degree 0
+/// are left out.
 std::vector<std::byte> encode_dot_splat(const SplatModel& model);
 
 }  // namespace darb

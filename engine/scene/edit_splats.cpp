@@ -1,8 +1,8 @@
 #include "engine/scene/edit_splats.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 #include <numbers>
 
@@ -13,11 +13,12 @@ namespace darb {
 
 namespace {
 
-constexpr double kFarOff = 256;   // float32 resolves 1/65,000 of a width there
-constexpr double kNoWidth = 1e4;  // for splats in one place: float32 has no millimetres from there
-constexpr double kMostOrigin = 1e30;  // no float32 less this is beyond float32
+constexpr double kFarOff = 256;       // widths from 0, where float32 resolves 1/65,000 of a width
+constexpr double kNoWidth = 1e4;      // for splats in one place: beyond, float32 does not resolve
+                                      // millimetres
+constexpr double kMostOrigin = 1e30;  // float32 numbers minus this do not overflow float32
 
-// A reflection is the one of x followed by a proper rotation. It takes the rotation of a splat to
+// A reflection is that of x followed by a proper rotation. It turns the rotation of a splat into
 // its conjugate, which turns the other way about the y and z axes.
 void turn_rotations(const glm::dmat3& turn, std::vector<float>& rotation) {
     glm::dmat3 proper = turn;
@@ -35,7 +36,7 @@ void turn_rotations(const glm::dmat3& turn, std::vector<float>& rotation) {
     }
 }
 
-// Row i of `to` becomes row splats[i] of `from`; the same array where splats ascend.
+// Sets row i of `to` to row splats[i] of `from`. Both may be the same array where splats ascend.
 void gather_rows(const std::vector<float>& from, const std::vector<std::uint32_t>& splats,
                  std::size_t width, std::vector<float>& to) {
     for (std::size_t i = 0; i < splats.size(); ++i)
@@ -199,7 +200,7 @@ void limit_sh_degree(int degree, SplatModel& model) {
 }
 
 glm::dmat3 turn_of_up_axis(const std::string& axis) {
-    // Columns: where x, y and z go.
+    // Columns: where x, y and z are mapped.
     const glm::dvec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
     if (axis == "-y") return glm::dmat3(1.0);
     if (axis == "y") return {-x, -y, z};
@@ -258,7 +259,7 @@ ShRotation sh_rotation(const glm::dmat3& turn) {
         for (auto& row : band)
             for (double& entry : row)
                 if (std::abs(entry) < kNoise)
-                    entry = 0;  // flips of axes then keep zeros as they are
+                    entry = 0;  // so that flips of axes keep zeros as they are
     return sum;
 }
 

@@ -20,12 +20,13 @@ float scaled_logit(float logit, double factor) {
     return static_cast<float>(std::log(opacity / (1 - opacity)));
 }
 
-/// Each splat by its own shape, between fits at kFits shapes; returns the means.
+/// Converts each splat by its own shape, interpolating between fits at kFits shapes; returns the
+/// means.
 GaussianEquivalent convert_shapes(const SplatModel& model, bool keep_opacity, SplatModel& result) {
     constexpr int kFits = 64;
     const ShapedKernel& kernel = shaped_kernel(model.kernel);
     const bool is_gaussian =
-        kernel_profile(model.kernel).form == KERNEL_FORM_GES;  // at another size
+        kernel_profile(model.kernel).form == KERNEL_FORM_GES;  // whose Gaussians have another size
     const double first = kernel.first_shape(), step = (kernel.last_shape() - first) / (kFits - 1);
     std::vector<GaussianEquivalent> fits;
     for (int k = 0; k < kFits; ++k)

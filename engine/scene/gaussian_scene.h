@@ -1,4 +1,4 @@
-// A scene of another kernel as Gaussians, for viewers that know nothing else.
+// Converts a scene with another kernel to Gaussians, for viewers that know only these.
 #pragma once
 
 #include "engine/kernels/gaussian_equivalent.h"
@@ -6,10 +6,10 @@
 
 namespace darb {
 
-/// Scales and opacities of the Gaussian nearest to the scene's kernel (least squares over the image
-/// plane; gaussian_equivalent.h); the rest stays. An opacity that would pass 0.999 stops there.
-/// A Gaussian scene is returned as it is. *fit: what was used; of a kernel with shapes the means
-/// over the splats, each weighted by its opacity.
+/// Replaces scales and opacities by those of the Gaussian nearest to the scene's kernel (least
+/// squares over the image plane; gaussian_equivalent.h); everything else stays. Opacities are
+/// limited to 0.999. A Gaussian scene is returned unchanged. *fit: what was used; for a kernel with
+/// shapes, the means over the splats, weighted by opacity.
 SplatModel as_gaussians(const SplatModel& model, bool keep_opacity,
                         GaussianEquivalent* fit = nullptr);
 

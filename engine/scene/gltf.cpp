@@ -1,9 +1,9 @@
 #include "engine/scene/gltf.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <optional>
@@ -29,7 +29,7 @@ using nlohmann::json;
 using GltfBytes = std::span<const std::byte>;
 namespace fs = std::filesystem;
 
-constexpr int kMostDepth = 64;  // of the JSON; glTF itself needs 10 or so
+constexpr int kMostDepth = 64;  // nesting of the JSON; glTF itself needs about 10
 
 json parse_text(GltfBytes text, const std::string& where) {
     const auto* begin = reinterpret_cast<const char*>(text.data());
@@ -125,7 +125,7 @@ std::string percent_decoded(std::string_view uri, const std::string& where) {
     return text;
 }
 
-/// In the folder of the .gltf or below it.
+/// Reads a file in the folder of the .gltf or below.
 std::vector<std::byte> from_file(std::string_view uri, const SplatSource& source,
                                  const std::string& where) {
     const std::string name = percent_decoded(uri, where);
@@ -282,12 +282,12 @@ using nlohmann::json;
 
 // glTF has y up and z backward; scenes in memory have y down and z forward, as SPZ's are turned.
 const glm::dmat4 kFromYUp(1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1);
-constexpr double kSameLength = 1e-4;  // of the axes of a node, relative
+constexpr double kSameLength = 1e-4;  // relative tolerance for the lengths of a node's axes
 
 unsigned bit(gltf::ComponentType type, bool normalized) {
     return 1u << (2 * static_cast<unsigned>(type - gltf::kInt8) + (normalized ? 1u : 0u));
 }
-// What KHR_gaussian_splatting, and KHR_mesh_quantization of positions, allow.
+// What KHR_gaussian_splatting allows and, for positions, KHR_mesh_quantization.
 const unsigned kFloats = bit(gltf::kFloat, false);
 const unsigned kSignedUnits = bit(gltf::kInt8, true) | bit(gltf::kInt16, true);
 const unsigned kUnsignedUnits = bit(gltf::kUint8, true) | bit(gltf::kUint16, true);
@@ -301,7 +301,7 @@ struct PlacedSplats {
     glm::dmat4 to_world;
 };
 
-/// What the extension of our own says of a primitive.
+/// What darb's own extension says about a primitive.
 struct RadialKernel {
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
@@ -320,7 +320,7 @@ struct GltfScene {
     }
 };
 
-/// Of an attribute of a primitive, or of our extension's; allowed: bits.
+/// The accessor of a primitive's attribute, or of one of darb's extension. allowed: bits.
 std::optional<Accessor> attribute(const GltfScene& scene, const json& attributes, const char* name,
                                   int components, unsigned allowed) {
     if (!attributes.contains(name)) return std::nullopt;
@@ -340,7 +340,7 @@ Accessor needed(const GltfScene& scene, const json& attributes, const char* name
     return *found;
 }
 
-/// [N][components], of as many elements as positions there are.
+/// Reads [N][components], with as many elements as there are positions.
 template <class F>
 void fill(const GltfScene& scene, const Accessor& from, const char* name, std::size_t stride,
           std::vector<float>& to, const F& change) {
@@ -376,7 +376,7 @@ glm::dmat4 matrix_of(const json& node) {
     return matrix;
 }
 
-/// The nodes that are drawn: those of the scene, or all that are nobody's children.
+/// The nodes that are drawn: those of the scene, or all that are no node's children.
 std::vector<std::size_t> root_nodes(const json& document, std::size_t count) {
     std::vector<std::size_t> roots;
     if (document.contains("scenes") && !document.at("scenes").empty()) {
@@ -394,7 +394,7 @@ std::vector<std::size_t> root_nodes(const json& document, std::size_t count) {
     return roots;
 }
 
-/// Those of a mesh; other primitives are counted.
+/// Collects the splats of a mesh; other primitives are counted.
 void add_splats_of(const json& mesh, const glm::dmat4& to_world, std::vector<PlacedSplats>& placed,
                    std::size_t& others) {
     for (const json& primitive : mesh.at("primitives")) {
@@ -454,7 +454,8 @@ const json* radial_object(const json& primitive) {
     return extensions.contains(gltf::kRadial) ? &extensions.at(gltf::kRadial) : nullptr;
 }
 
-/// All that says which kernel it is: of our extension all but the attributes. null without it.
+/// Everything that identifies the kernel: our extension without its attributes; null where it is
+/// absent.
 json radial_facts(const json& primitive) {
     const json* object = radial_object(primitive);
     if (!object) return nullptr;
@@ -463,7 +464,7 @@ json radial_facts(const json& primitive) {
     return facts;
 }
 
-/// By name, or by the function of a kernel of one's own, which is registered.
+/// Finds the kernel by its name, or registers a user's own kernel from its function.
 std::optional<int> kernel_of(GltfScene& scene, const std::string& name, const json& facts) {
     if (!facts.contains("function")) return kernel_from_name(name);
     std::vector<std::string> notes;
@@ -475,7 +476,7 @@ std::optional<int> kernel_of(GltfScene& scene, const std::string& name, const js
     return kernel;
 }
 
-/// Nothing where this version does not know it: the fallback is read.
+/// Nothing where this version does not know the kernel; then the fallback is read.
 std::optional<RadialKernel> radial_kernel(GltfScene& scene, const json& facts) {
     if (facts.is_null()) return std::nullopt;
     const std::string name = facts.at("kernel").get<std::string>(),
@@ -529,7 +530,7 @@ void read_colours(GltfScene& scene, const json& attributes, SplatModel& model) {
     }
 }
 
-/// Linear, as the extension has them; its drafts stored logarithms, which negative numbers betray.
+/// Scales are linear in the extension. Its drafts stored logarithms, which negative numbers reveal.
 void read_scales(GltfScene& scene, const json& attributes, SplatModel& model) {
     const Accessor scale =
         needed(scene, attributes, gltf::kScale, 3, kFloats | kSignedUnits | kSigned);
@@ -542,7 +543,8 @@ void read_scales(GltfScene& scene, const json& attributes, SplatModel& model) {
         value = limit_infinite_log_scale(static_cast<float>(std::log(double{value})));
 }
 
-/// 0 to 1, as the extension has them; other programs write logits, which lie outside of that.
+/// Opacities are 0 to 1 in the extension. Other programs write logits, which lie outside that
+/// range.
 void read_opacities(GltfScene& scene, const json& attributes, SplatModel& model) {
     const Accessor opacity = needed(scene, attributes, gltf::kOpacity, 1, kFloats | kUnsignedUnits);
     fill(scene, opacity, gltf::kOpacity, 1, model.opacity_logit, kAsItIs);
@@ -593,7 +595,7 @@ void note_properties(GltfScene& scene, const json& splats, bool exact) {
             "distance: not followed");
 }
 
-/// Throws where the node's axes are not at right angles and of one length.
+/// Throws Error where the node's axes are not at right angles or differ in length.
 Similarity similarity_of(const GltfScene& scene, const glm::dmat4& to_world) {
     const glm::dmat3 linear(to_world);
     const double scale = glm::length(linear[0]);
@@ -644,7 +646,7 @@ SplatModel read_placed(GltfScene& scene, const PlacedSplats& placed,
     return model;
 }
 
-/// Where all primitives have the same; nothing, with a note, where they do not.
+/// The kernel that all primitives have in common; nothing, with a note, where they differ.
 std::optional<RadialKernel> common_kernel(GltfScene& scene,
                                           const std::vector<PlacedSplats>& placed) {
     const json first = radial_facts(placed[0].primitive);
@@ -718,7 +720,7 @@ SplatModel load_gltf(const SplatSource& source, SplatFile& file) try {
     throw Error(source.where, std::string("names what is not there: ") + error.what(), kCopyAgain);
 }
 
-// JSON that says so, or is named .gltf.
+// Whether this is a .glb, or JSON that names the extension or is named .gltf.
 bool is_gltf(const SplatSource& source) {
     if (starts_with(source.bytes, "glTF")) return true;
     const std::string_view text(reinterpret_cast<const char*>(source.bytes.data()),
@@ -778,7 +780,7 @@ struct GltfWriter {
     }
 };
 
-/// Whether the extension of our own is needed: for what KHR_gaussian_splatting has no place for.
+/// Whether darb's own extension is needed, for what KHR_gaussian_splatting cannot store.
 bool is_radial(const SplatModel& model) {
     return model.kernel != KERNEL_GAUSSIAN || model.footprint != Footprint::psi ||
            model.antialias || model.origin != glm::dvec3(0.0);

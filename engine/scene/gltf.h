@@ -1,5 +1,5 @@
-// glTF 2.0 with splats (KHR_gaussian_splatting), as .glb or .gltf: what its reader and its writer
-// share. docs/gltf.md says what is read and written, and describes the extension of our own.
+// glTF 2.0 with splats (KHR_gaussian_splatting), as .glb or .gltf: what the reader and the writer
+// share. docs/gltf.md says what is read and written, and describes darb's own extension.
 #pragma once
 
 #include <cstddef>
@@ -26,19 +26,19 @@ constexpr std::size_t kGlbHeader = 12, kGlbChunkHeader = 8;  // bytes
 
 enum ComponentType { kInt8 = 5120, kUint8, kInt16, kUint16, kUint32 = 5125, kFloat };
 
-/// The JSON and the buffers it names, from wherever they are.
+/// The JSON and the buffers that it names, wherever these are stored.
 struct Document {
     nlohmann::json json;
     std::vector<std::vector<std::byte>> buffers;
-    std::size_t bytes = 0;  // of all that was read
+    std::size_t bytes = 0;  // total size of what was read
     std::string where;
 };
 
-/// JSON, or the chunks of a .glb; buffers from the .glb, data URIs, or files in the source's folder
-/// and those below, and from nowhere else. Throws Error.
+/// Reads JSON, or the chunks of a .glb. Buffers come from the .glb, data URIs, or files in the
+/// source's folder and its subfolders, and from nowhere else. Throws Error.
 Document open_document(const SplatSource& source);
 
-/// Numbers of an accessor; within its buffer.
+/// Numbers of an accessor, which lie within its buffer.
 struct Accessor {
     std::span<const std::byte> bytes;  // from the first element on
     std::size_t count = 0, stride = 0;
@@ -46,21 +46,21 @@ struct Accessor {
     ComponentType type = kFloat;
     bool normalized = false;
 
-    /// Integers that are normalised are taken to 0..1 or -1..1.
+    /// Normalised integers are mapped to 0..1 or -1..1.
     double value(std::size_t element, int component) const;
 };
 
-/// json[key] as a whole number from 0 on; `otherwise` where it is missing.
+/// json[key] as a whole number >= 0; `otherwise` where the key is missing.
 std::size_t whole_number(const nlohmann::json& object, const char* key, std::size_t otherwise);
-/// The same where it has to be there.
+/// As above, but throws Error where the key is missing.
 std::size_t whole_number(const nlohmann::json& object, const char* key);
 
-/// what: in errors. Throws Error where the accessor is sparse or lies outside its buffer.
+/// what: names the accessor in errors. Throws Error where it is sparse or lies outside its buffer.
 Accessor find_accessor(const Document& document, std::size_t index, const std::string& what);
 
-/// Of what other programs draw in place of a kernel that is no Gaussian.
+/// Sentences on what other programs draw in place of a kernel that is not Gaussian.
 std::vector<std::string> fallback_losses(const SplatModel& model, const std::string& where);
-/// A .glb, or, where `where` ends in .gltf, JSON with a .bin beside it.
+/// Encodes a .glb or, where `where` ends in .gltf, JSON with a .bin beside it.
 EncodedSplats encode(const SplatModel& model, const std::string& where, const EncodeOptions&);
 
 }  // namespace darb::gltf

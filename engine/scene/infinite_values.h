@@ -1,7 +1,7 @@
-// Infinite parameters that mean something, one rule for all readers: a logit of +-infinity is an
-// opacity of 1 or 0 (as PLYs have it that were expanded from formats with a byte of opacity), a log
-// scale of -infinity is a splat without extent on that axis. They become the limits at which the
-// passes clamp them. NaN and every other infinity stay, and such splats are dropped.
+// Infinite parameters that are meaningful, with one rule for all readers. A logit of +-infinity is
+// an opacity of 1 or 0 (PLYs expanded from formats with one byte of opacity have it); a log
+// scale of -infinity is a splat without extent on that axis. They are replaced by the limits to
+// which the passes clamp them. NaN and every other infinity stay, and such splats are dropped.
 #pragma once
 
 #include <cmath>

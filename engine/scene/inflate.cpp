@@ -16,9 +16,9 @@ namespace {
 
 constexpr std::size_t kStep = std::size_t{1} << 20;  // bytes of output at a time
 constexpr int kGzipWindow = 16 + MAX_WBITS;
-constexpr int kZstdLevel = 12;  // as the reference writer of SPZ
+constexpr int kZstdLevel = 12;  // that of SPZ's reference writer
 
-// deflate reaches 1,032 at most; scenes reach 20.
+// deflate reaches at most 1,032; scenes reach 20.
 constexpr std::uint64_t kLargestExpansion = 1024;
 constexpr std::uint64_t kAlwaysAllowed = std::uint64_t{1} << 20;  // bytes
 

@@ -1,7 +1,8 @@
-// .ksplat, of the viewer GaussianSplats3D (github.com/mkkellogg/GaussianSplats3D): a header of
-// 4,096 bytes, one of 1,024 a section, then the sections: lengths of the buckets that are not full,
-// the buckets' centres, the splats. Numbers are float32 at compression level 0, float16 at 1 and 2,
-// harmonics a byte at 2; positions at 1 and 2 are 16 bits relative to the bucket.
+// .ksplat, the format of the viewer GaussianSplats3D (github.com/mkkellogg/GaussianSplats3D): a
+// header of 4,096 bytes, one of 1,024 bytes per section, then the sections: lengths of the buckets
+// that are not full, the buckets' centres, the splats. Numbers are float32 at compression level 0
+// and float16 at 1 and 2; harmonics take one byte each at 2; positions at 1 and 2 are 16 bits,
+// relative to the bucket.
 //   centre 3, standard deviation 3, rotation w x y z, r g b opacity 4 x uint8,
 //   harmonics of degree 1, then 2: all red, then green, then blue
 #include <fmt/format.h>
@@ -27,20 +28,20 @@ constexpr std::size_t kHead = 4096, kSectionHead = 1024;  // bytes
 constexpr std::uint64_t kMostSections = 1 << 16;
 constexpr int kMostKsplatDegree = 2;
 
-/// Bytes of a number of each kind, by compression level.
+/// Bytes that a number of each kind takes, by compression level.
 struct KsplatLevel {
     std::size_t centre, scale, rotation, harmonic;
 };
 constexpr KsplatLevel kLevels[] = {{4, 4, 4, 4}, {2, 2, 2, 2}, {2, 2, 2, 1}};
 
 struct KsplatSection {
-    std::uint64_t splats = 0, room = 0;  // splats that are there, and that there is room for
+    std::uint64_t splats = 0, room = 0;  // splats stored, and splats that there is room for
     std::uint64_t bucket_size = 0, buckets = 0, full_buckets = 0, part_buckets = 0;
-    std::uint64_t bucket_bytes = 0;  // of a centre
-    double step = 0;                 // of a position
+    std::uint64_t bucket_bytes = 0;  // bytes of a bucket's centre
+    double step = 0;                 // step of a position, world units
     double range = 0;                // subtracted from its 16 bits
     int degree = 0;
-    std::uint64_t begin = 0;  // of its data, in the file
+    std::uint64_t begin = 0;  // offset of the section's data in the file
 
     std::size_t harmonics() const {
         return 3 * static_cast<std::size_t>((degree + 1) * (degree + 1) - 1);
@@ -59,10 +60,10 @@ struct KsplatFile {
     KsplatBytes bytes;
     std::string where;
     KsplatLevel level{};
-    int number = 0;  // of the level
+    int number = 0;  // number of the compression level
     double least_harmonic = -1.5, most_harmonic = 1.5;
     std::vector<KsplatSection> sections;
-    bool logarithms = false;  // as the user says of its scales
+    bool logarithms = false;  // the user says that scales are logarithms
     bool scales_below_0 = false;
 
     std::uint32_t word(std::size_t at) const { return load_le<std::uint32_t>(bytes, at); }
@@ -90,7 +91,7 @@ KsplatSection read_section(const KsplatFile& file, std::size_t head, std::uint64
     return section;
 }
 
-/// The reason why these bytes are no .ksplat, or nothing.
+/// The reason why these bytes are not .ksplat; nothing where they are.
 std::optional<std::string> read_layout(KsplatFile& file) {
     if (file.bytes.size() < kHead)
         return fmt::format("holds {} bytes; the header has {}", file.bytes.size(), kHead);
@@ -127,7 +128,8 @@ std::optional<std::string> read_layout(KsplatFile& file) {
     return std::nullopt;
 }
 
-/// Of each splat of a section, in order: the full ones, then those whose lengths are listed.
+/// The bucket of each splat of a section, in order: the full buckets, then those whose lengths are
+/// listed.
 std::vector<std::uint32_t> buckets_of(const KsplatFile& file, const KsplatSection& section) {
     std::vector<std::uint32_t> bucket(section.splats);
     const auto full = std::min(section.splats, section.full_buckets * section.bucket_size);
@@ -151,7 +153,8 @@ float harmonic_at(const KsplatFile& file, std::size_t at) {
                               unit * (file.most_harmonic - file.least_harmonic));
 }
 
-/// Coefficient-major, rgb innermost, from band by band and channel by channel.
+/// Converts harmonics stored band by band and channel by channel to coefficient-major, rgb
+/// innermost.
 void read_harmonics_at(const KsplatFile& file, std::size_t at, int degree, float* to) {
     for (int l = 1; l <= degree; ++l) {
         const int before = l * l - 1, of_band = 2 * l + 1;
@@ -217,7 +220,7 @@ SplatModel load_ksplat(const SplatSource& source, SplatFile& facts) {
     return model;
 }
 
-// It has no mark of its own: sections that fit the file to the byte are one.
+// The format has no signature; it is recognised by sections that fit the file to the byte.
 bool is_ksplat(const SplatSource& source) {
     if (lower(source.where).ends_with(".ksplat")) return true;
     KsplatFile file{source.bytes, source.where, {}, 0, -1.5, 1.5, {}};

@@ -1,15 +1,15 @@
-// Rounds until few enough are left: the nearest neighbours of each splat are what it may merge
-// with; pairs are taken from the cheapest on, each splat once, at most a share of all in a round,
-// so that what is merged early is cheap. Each thread works on splats of its own and ties go by
-// index, so that the number of threads changes nothing.
+// Merges in rounds until few enough splats are left. A splat may merge with its nearest neighbours;
+// pairs are taken from the cheapest on, each splat at most once, up to a share of all in a round,
+// so that early merges are cheap. Each thread works on its own splats, and ties are broken by
+// index, so that the number of threads does not matter.
 #include "engine/scene/merge_splats.h"
 
+#include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
-#include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <nanoflann.hpp>
@@ -33,14 +33,16 @@ namespace {
 
 constexpr std::size_t kNearest = 6;
 constexpr std::size_t kRoundDivisor = 4;  // a round merges at most a fourth of the splats
-constexpr std::size_t kAlongCurve = 2;    // of a quick merge: so many neighbours, of later splats
-constexpr std::size_t kCurveSplats = 64;  // splats of one code of the curve
+constexpr std::size_t kAlongCurve = 2;    // quick: this many later splats on the curve are
+                                          // neighbours
+constexpr std::size_t kCurveSplats = 64;  // splats with one code of the curve
 constexpr double kApart = 1e-3;
-constexpr std::size_t kBlock = 1 << 15, kPart = 256;  // splats between reports, of a thread at once
+constexpr std::size_t kBlock = 1 << 15, kPart = 256;  // splats between reports; splats that a
+                                                      // thread takes at a time
 constexpr std::uint32_t kNone = 0xffffffff;
 
-/// Means, each moved within a thousandth of its splat's size: many in one place would make every
-/// search visit all of them.
+/// Means, each moved by up to a thousandth of its splat's size: many means in one place would make
+/// every search visit all of them.
 std::vector<glm::dvec3> apart(const std::vector<SplatMoments>& moments) {
     std::vector<glm::dvec3> points(moments.size());
     std::uint32_t state = 1;
@@ -75,12 +77,12 @@ struct Candidate {
     auto operator<=>(const Candidate&) const = default;
 };
 
-/// The splats of a level that is being made.
+/// The splats of the level that is being made.
 class Merging {
   public:
     Merging(const SplatModel& model, std::size_t last, const MergeOptions& options);
     void merge_to(std::size_t count);
-    /// Of the splats as they are now.
+    /// The model of the splats as they are now.
     SplatModel level() const;
 
   private:
@@ -95,11 +97,11 @@ class Merging {
     void for_all(double from, double to, const Work& work);
     void report(double share_of_round) const;
 
-    SplatModel model_;  // harmonics as they are now; the rest of what was not merged
+    SplatModel model_;  // current harmonics; everything else of splats that were not merged
     std::vector<SplatMoments> moments_;
     std::vector<std::uint8_t> merged_;
     double second_moment_;
-    std::size_t threads_, first_, last_, round_ = 0;  // splats; merges of the round under way
+    std::size_t threads_, first_, last_, round_ = 0;  // splats; merges in the current round
     const MergeOptions& options_;
 };
 
@@ -112,7 +114,7 @@ SplatModel along_curve(const SplatModel& model) {
     SplatModel places;
     places.origin = model.origin;
     places.position = model.position;
-    places.opacity_logit = model.opacity_logit;  // their number
+    places.opacity_logit = model.opacity_logit;  // sets the number of splats
     for (std::size_t i = 0; i < model.size(); ++i)
         if (!is_drawn(model, i)) std::fill_n(&places.position[3 * i], 3, 0.0f);
     return pick_splats(model, chunk_order(places, kCurveSplats));
@@ -132,7 +134,7 @@ Merging::Merging(const SplatModel& model, std::size_t last, const MergeOptions& 
         if (is_drawn(model_, i)) moments_[i] = moments_of(model_, i);
     if (!kernel_has_shape(model.kernel)) return;
     const ShapedKernel& kernel = shaped_kernel(model.kernel);
-    // What is merged has the shape 0. A splat counts as the one of this shape that is as wide.
+    // A merged splat has the shape 0, so a splat counts as the one with this shape that is as wide.
     for (std::size_t i = 0; i < first_; ++i) {
         const double moment = kernel.second_moment(
             model.footprint, kernel.exponent(model.footprint, model_.shape[i]));
@@ -148,7 +150,7 @@ void Merging::report(double share) const {
     options_.progress(std::min(done / static_cast<double>(first_ - last_), 1.0));
 }
 
-/// work(i) of all splats, on all threads; must not throw.
+/// Calls work(i) for all splats, on all threads; work must not throw.
 template <class Work>
 void Merging::for_all(double from, double to, const Work& work) {
     const std::size_t count = model_.size();
@@ -187,7 +189,7 @@ void Merging::keep_only(const Keep& keep) {
     model_.resize(to);
 }
 
-/// The first of them, where that is enough.
+/// Drops splats that are never drawn, but no more than it takes to come down to `count`.
 void Merging::drop_undrawn(std::size_t count) {
     std::size_t excess = model_.size() - std::min(count, model_.size());
     if (excess == 0) return;
@@ -229,7 +231,7 @@ std::vector<Candidate> Merging::find_candidates(const std::vector<std::uint32_t>
         for (std::size_t k = kNearest * i; k < kNearest * (i + 1); ++k) {
             const std::uint32_t other = neighbours[k];
             if (other == kNone) break;
-            // A pair that the other has too is the smaller index's.
+            // Where both list the pair, it belongs to the smaller index.
             const auto his = neighbours.begin() + static_cast<std::ptrdiff_t>(kNearest * other);
             const auto end = his + static_cast<std::ptrdiff_t>(kNearest);
             if (other < i && std::find(his, end, static_cast<std::uint32_t>(i)) != end) continue;
@@ -260,7 +262,7 @@ void Merging::merge(std::uint32_t a, std::uint32_t b) {
 }
 
 std::size_t Merging::merge_cheapest(std::vector<Candidate>& candidates, std::size_t most) {
-    std::vector<std::uint8_t> taken(model_.size());  // 1: merged into, 2: gone
+    std::vector<std::uint8_t> taken(model_.size());  // 1: has absorbed another; 2: absorbed
     std::size_t merges = 0;
     for (const Candidate& c : candidates) {
         if (merges == most) break;
@@ -323,12 +325,13 @@ SplatModel merge_splats(const SplatModel& model, std::size_t count, const MergeO
 
 namespace {
 
-constexpr double kThinnest = 1e-3;  // share of the mean variance that a projection has at least
+constexpr double kThinnest = 1e-3;  // least variance of a projection, as a share of the mean
+                                    // variance
 
 constexpr double kLeastOpacity = 1e-13;  // the limit of logits
 constexpr double kMostOpacity = 0.99;    // where blending clamps
-// Opaque neighbours hide each other: of what is more than opaque this power is real area. Measured,
-// docs/experiments/merging.md.
+// Opaque neighbours hide each other, so of an opacity above 1 only this power becomes area.
+// Measured, see docs/experiments/merging.md.
 constexpr double kGrowth = 0.4;
 
 /// Symmetric 2x2: xx, xy, yy.
@@ -349,14 +352,14 @@ Covariance2 projection(const Symmetric3& c, int axis) {
     }
 }
 
-/// A splat as a picture along an axis sees it.
+/// A splat as seen in a picture along an axis.
 struct Blob {
     Covariance2 covariance;
-    double root;  // of the determinant
+    double root;  // square root of the determinant
     double x, y, opacity;
 };
 
-/// Integral of the product of two Gaussians of peak 1 over 2 pi.
+/// Integral of the product of two Gaussians with peak 1, divided by 2 pi.
 double overlap(const Blob& a, const Blob& b, double second_moment) {
     const Covariance2 sum{a.covariance.xx + b.covariance.xx, a.covariance.xy + b.covariance.xy,
                           a.covariance.yy + b.covariance.yy};

@@ -18,7 +18,7 @@ struct Weighted {
     double value, weight;
 };
 
-/// The value below which `share` of the weight lies.
+/// The value below which a share of the weight lies.
 double weighted_quantile(std::vector<Weighted> values, double share) {
     std::sort(values.begin(), values.end(),
               [](const Weighted& a, const Weighted& b) { return a.value < b.value; });

@@ -1,4 +1,4 @@
-// Cameras for a scene that comes without any.
+// Cameras for a scene that has none.
 #pragma once
 
 #include <vector>
@@ -10,17 +10,18 @@
 namespace darb {
 
 /// Where the opacity of a scene is: its median, and the radius that holds nine tenths of it, at
-/// least 1e-6. World coordinates from SplatModel::origin. For models with at least one splat.
+/// least 1e-6. World units, relative to SplatModel::origin. The model must have at least one splat.
 struct SceneBall {
     glm::dvec3 centre{0.0};
     double radius = 1;
 };
 SceneBall opaque_ball(const SplatModel& model);
 
-/// `count` cameras on a circle that look slightly down (y is down) at that ball, far enough for it
-/// to be in the picture. For models with at least one splat.
+/// `count` cameras on a circle that look slightly down (y is down) at that ball, from far enough
+/// away to have it in the picture. The model must have at least one splat.
 std::vector<Camera> orbit_cameras(const SplatModel& model, int count, int width, int height);
-/// The same around a ball, looking down from `up`, of unit length; the first from usual_front(up).
+/// As above, around the given ball, looking down from `up`, which has unit length; the first camera
+/// looks from usual_front(up).
 std::vector<Camera> orbit_cameras(const Bounds& ball, int count, int width, int height,
                                   const glm::dvec3& up);
 

@@ -1,10 +1,10 @@
 #include "engine/scene/ply.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
@@ -30,7 +30,7 @@ namespace darb {
 
 namespace {
 
-// float32 is what the model stores.
+// The model stores float32.
 float stored(const double* values, const PlyColumns& columns, std::size_t a, std::size_t c) {
     const auto value = static_cast<float>(values[columns.of[a][c]]);
     const auto limit = kSplatAttributes[a].from_file;
@@ -44,7 +44,7 @@ bool all_finite(const double* values, const PlyColumns& columns) {
     return true;
 }
 
-// A column that is named as shapes are, of a kernel that has none.
+// Drops a column that is named like shapes, where the kernel has none.
 void drop_shapes_of_others(int kernel, PlyColumns& columns) {
     if (columns.foreign_beta || columns.of[kShape].empty() || kernel_takes(kernel, kShape)) return;
     columns.of[kShape].clear();
@@ -78,7 +78,9 @@ std::string make_header(const SplatModel& model, bool double_positions) {
 
 template <class T>
 std::byte* put(std::byte* to, const T* values, std::size_t count) {
-    if (count > 0) std::memcpy(to, values, count * sizeof(T));  // values may be null without any
+    if (count > 0)
+        std::memcpy(to, values, count * sizeof(T));  // values may be null where count is
+                                                     // 0
     return to + count * sizeof(T);
 }
 
@@ -109,7 +111,7 @@ std::string encoding_of(const PlyHeader& header) {
     return header.format == PlyFormat::big_endian ? "binary, big-endian" : "binary, little-endian";
 }
 
-// What these programs write is in logarithms and logits, and reading it takes them for that.
+// These programs write logarithms and logits, and are read accordingly.
 void refuse_units(const PlyHeader& header, const SplatSource& source) {
     const PlyElement* vertex = header.find("vertex");
     const bool changed =
@@ -121,7 +123,7 @@ void refuse_units(const PlyHeader& header, const SplatSource& source) {
                 "Leave out --scales and --opacities.");
 }
 
-// Compressed PLY too.
+// Reads compressed PLY, too.
 SplatModel load_ply(const SplatSource& source, SplatFile& file) {
     const PlyHeader header = parse_ply_header(source.bytes, source.where);
     if (is_compressed_ply(header)) file.format = SplatFormat::compressed_ply;
@@ -272,7 +274,7 @@ const SplatFormatRow& ply_format() {
 
 namespace {
 
-/// Of "Key: value" or "Key value"; empty where the comment has another key.
+/// The value in "Key: value" or "Key value"; empty where the comment has another key.
 std::string_view value_of(std::string_view comment, std::string_view key) {
     if (lower(comment.substr(0, key.size())) != lower(key)) return {};
     comment.remove_prefix(key.size());
@@ -297,7 +299,8 @@ int kernel_defined_by(std::string_view name, std::string_view function, const st
         notes);
 }
 
-/// Of a kernel of one's own: what makes it here, and what draws it in a program that has no fit.
+/// Comments on a user's own kernel: what defines it here, and what draws it in a program that
+/// cannot fit one.
 std::string function_comments(const SplatModel& model) {
     const KernelDefinition* definition = kernel_definition(model.kernel);
     if (definition == nullptr) return {};
@@ -377,7 +380,7 @@ namespace {
 constexpr std::size_t kRestOfDegree3 = 45, kRestOfDegree4 = 72;
 constexpr std::size_t kMostNamed = 8;  // properties, in a note
 
-/// -1 where there is none of that name, or a list.
+/// Column of the property; -1 where there is none with that name, or it is a list.
 int find_value(const PlyElement& vertex, std::string_view name) {
     const int column = vertex.find(name);
     return column < 0 || vertex.properties[static_cast<std::size_t>(column)].is_list ? -1 : column;
@@ -396,7 +399,7 @@ bool is_foreign_beta(const PlyElement& vertex) {
            vertex.find(ply_column(kShape, 0)) < 0;
 }
 
-/// Deformable Beta Splatting has other names of harmonics.
+/// The column of a harmonic; Deformable Beta Splatting has other names.
 std::string harmonics_column(const PlyElement& vertex, int attribute, std::size_t c) {
     return is_foreign_beta(vertex) ? fmt::format("{}_{}", attribute == kShDc ? "sh0" : "shN", c)
                                    : ply_column(attribute, c);
@@ -432,7 +435,7 @@ void find_harmonics(const PlyElement& vertex, const std::string& where, PlyColum
         columns.of[kShRest].push_back(rest[i % 3 * (rest.size() / 3) + i / 3]);
 }
 
-/// Names; harmonics have a note of their own.
+/// Names of unread properties, but for harmonics, which have a note of their own.
 std::vector<std::string> unread_properties(const PlyElement& vertex, const PlyColumns& columns) {
     const bool lobes = vertex.find("sb_params_0") >= 0;
     std::vector<int> read = columns.normal;
@@ -479,7 +482,7 @@ PlyColumns find_ply_columns(const PlyElement& vertex, const std::string& where) 
     columns.count = vertex.properties.size();
     columns.dc_is_byte = has_colour_bytes(vertex);
     const char* const colours[] = {"red", "green", "blue"};
-    const int missing = static_cast<int>(columns.count);  // translate_row puts it there
+    const int missing = static_cast<int>(columns.count);  // the column that translate_row adds
     const bool flat = vertex.find(ply_column(kLogScale, 2)) < 0;
     for (const int a : attributes_in_file_order()) {
         if (a == kShRest) continue;
@@ -545,7 +548,7 @@ const double* translate_row(const PlyColumns& columns, const double* values,
     const bool as_3dgs = columns.of[kLogScale][2] < static_cast<int>(columns.count);
     if (as_3dgs && !columns.dc_is_byte && columns.filter < 0) return values;
     row.assign(values, values + columns.count);
-    row.push_back(-LOG_SCALE_LIMIT);  // of the axis that the file may lack
+    row.push_back(-LOG_SCALE_LIMIT);  // for an axis that the file may lack
     double* at = row.data();
     if (columns.dc_is_byte)
         for (const int column : columns.of[kShDc]) at[column] = dc_of_colour(at[column] / 255);

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 20;
 constexpr std::size_t kMostShown = 40;                  // bytes of a word
 constexpr std::size_t kMostFirstLine = 100;             // bytes
-constexpr std::string_view kUtf8Mark = "\xef\xbb\xbf";  // of text, before it begins
+constexpr std::string_view kUtf8Mark = "\xef\xbb\xbf";  // byte order mark before UTF-8 text
 constexpr std::size_t kProgressRows = 1 << 16;          // between two reports
 std::size_t type_size(PlyType type) {
     switch (type) {
@@ -139,7 +139,7 @@ PlyProperty parse_property(const std::vector<std::string_view>& words, const std
     return property;
 }
 
-/// Whether the line names the format.
+/// Parses a line of the header; returns whether it names the format.
 bool parse_header_line(std::string_view line, PlyHeader& header, const std::string& where) {
     const std::vector<std::string_view> words = split_words(line);
     if (words.empty() || words[0] == "obj_info") return false;
@@ -163,7 +163,7 @@ bool parse_header_line(std::string_view line, PlyHeader& header, const std::stri
     return false;
 }
 
-/// Smallest size of a row; lists count with their length field only (binary) or one word (ascii).
+/// Least size of a row; a list counts with its length field only (binary) or one word (ascii).
 std::uint64_t least_row_bytes(const PlyElement& element, PlyFormat format) {
     if (format == PlyFormat::ascii) return 2 * element.properties.size();
     std::uint64_t bytes = 0;
@@ -228,7 +228,7 @@ class RowReader {
         return value;
     }
 
-    /// The word around at_ is no number: which line it is in, and what it looks like.
+    /// Throws because the word at at_ is not a number; says in which line, and what it looks like.
     [[noreturn]] void fail_at_word(const PlyElement& element, std::size_t row) const {
         const std::string_view text(reinterpret_cast<const char*>(file_.data()), file_.size());
         constexpr const char* kBlanks = " \t\r\n";
@@ -252,7 +252,7 @@ class RowReader {
         throw Error(where_, place + " is not a number", kCopyAgain);
     }
 
-    /// Whether nothing but blanks stands before the end of the line (or of the file).
+    /// Whether only blanks are left before the end of the line (or of the file).
     bool at_line_end() const {
         const char* text = reinterpret_cast<const char*>(file_.data());
         std::size_t at = at_;
@@ -266,9 +266,9 @@ class RowReader {
         return at;
     }
 
-    /// A row of another length than the header says would shift all behind it. Where the first row
-    /// is a line, all have to be. A file that breaks its lines elsewhere, between rows, is read
-    /// word by word.
+    /// A row with another length than the header declares would shift everything after it. Where
+    /// the first row is one line, all must be. A file that breaks its lines elsewhere is read word
+    /// by word.
     void check_line(const PlyElement& element, std::size_t row, std::size_t begin) {
         if (format_ != PlyFormat::ascii) return;
         const std::string_view all(reinterpret_cast<const char*>(file_.data()), file_.size());
@@ -342,7 +342,7 @@ PlyHeader parse_ply_header(std::span<const std::byte> file, const std::string& w
                                 std::min(file.size(), kMaxHeaderBytes));
     if (!looks_like_ply(file))
         throw Error(where, "is no PLY file: it does not begin with 'ply'", "Check the path.");
-    // Files of old programs end lines with a carriage return alone.
+    // Files of old programs end lines with a bare carriage return.
     const std::size_t first = text.find_first_of("\r\n");
     const bool returns =
         text.substr(first).size() > 1 && text[first] == '\r' && text[first + 1] != '\n';
@@ -391,7 +391,7 @@ std::size_t read_ply_rows(std::span<const std::byte> file, const PlyHeader& head
     check_ply_size(file, header, element, where);
     RowReader reader(file, header, where);
     for (const PlyElement& candidate : header.elements) {
-        if (candidate.properties.empty()) continue;  // of any number of rows
+        if (candidate.properties.empty()) continue;  // takes no bytes, however many rows it has
         std::vector<double> values(candidate.properties.size());
         const bool wanted = &candidate == &element;
         for (std::size_t i = 0; i < candidate.count; ++i) {

@@ -8,8 +8,8 @@ namespace darb {
 namespace {
 
 constexpr std::size_t kFewest = 20;  // points
-// Added to the diagonal, as a share of it: directions that shift the picture by less than a tenth
-// of what turn and move do one by one make no longer steps.
+// Added to the diagonal, as a share of it, so that steps stay bounded along directions in which the
+// picture shifts by less than a tenth of what turn and move would shift it separately.
 constexpr double kDamping = 1e-2;
 
 glm::dmat3 cross_matrix(const glm::dvec3& v) {  // columns
@@ -23,7 +23,7 @@ glm::dvec3 move_of(const PoseVector& step) {
     return {step[3], step[4], step[5]};
 }
 
-// Places at five depths over the picture.
+// Places at five depths, spread over the picture.
 std::vector<glm::dvec3> spread_places(const Camera& c, double depth) {
     constexpr int kSide = 6;
     constexpr std::array kDepths{0.5, 0.75, 1.0, 1.5, 2.0};
@@ -130,8 +130,9 @@ double PoseMetric::shift_px(const PoseVector& step) const {
     return std::sqrt(std::max(sum, 0.0));
 }
 
-// What keeps a picture when the world turns about the cameras' middle by w, moves by t and grows by
-// s: turn -R w, move (R w) x p + s p - R t, p the middle in the camera.
+// The steps that leave pictures unchanged when the world turns about the cameras' middle by w,
+// moves by t and grows by s: turn -R w, move (R w) x p + s p - R t, where p is the middle in camera
+// space.
 Gauge::Gauge(std::span<const Camera> cameras, std::span<const PoseMetric> metrics) {
     glm::dvec3 middle(0.0);
     for (const Camera& c : cameras) middle += c.centre() / static_cast<double>(cameras.size());
@@ -148,7 +149,7 @@ Gauge::Gauge(std::span<const Camera> cameras, std::span<const PoseMetric> metric
         for (PoseVector& column : columns) column = metrics[i].from_step(column);
         basis_.push_back(columns);
     }
-    // Gram and Schmidt; what the others make up for is left out.
+    // Gram-Schmidt; a vector that depends on the others is left out.
     for (std::size_t k = 0; k < 7; ++k) {
         const auto dot = [&](std::size_t a, std::size_t b) {
             double sum = 0;

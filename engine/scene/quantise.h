@@ -1,5 +1,5 @@
-// What the small splat formats share: numbers of few bits, bytes of opacity and colour, quaternions
-// without their largest component.
+// What the small splat formats share: numbers with few bits, opacity and colour in one byte, and
+// quaternions without their largest component.
 #pragma once
 
 #include <algorithm>
@@ -16,12 +16,12 @@
 
 namespace darb {
 
-/// Nearest of 0 .. 255.
+/// Rounds to the nearest of 0 .. 255.
 inline std::uint8_t nearest_byte(double value) {
     return static_cast<std::uint8_t>(std::clamp(std::round(value), 0.0, 255.0));
 }
 
-/// The opacity byte / 255, as a logit; 0 and 255 are opacities of 0 and 1.
+/// The opacity byte / 255 as a logit; 0 and 255 become finite logits by limit_infinite_logit.
 inline float logit_of_byte(std::uint8_t byte) {
     const double alpha = byte / 255.0;
     return limit_infinite_logit(static_cast<float>(std::log(alpha) - std::log1p(-alpha)));
@@ -30,13 +30,13 @@ inline std::uint8_t byte_of_logit(double logit) {
     return nearest_byte(255 / (1 + std::exp(-logit)));
 }
 
-/// As the passes clamp it.
+/// The log scale as the passes clamp it.
 inline float drawn_log_scale(float log_scale) {
     constexpr auto kMost = static_cast<float>(LOG_SCALE_LIMIT);
     return std::clamp(log_scale, -kMost, kMost);
 }
 
-/// Colour in [0, 1] of a dc coefficient.
+/// The colour in [0, 1] of a dc coefficient.
 inline double colour_of_dc(double dc) {
     return 0.5 + kShBand0 * dc;
 }
@@ -49,14 +49,14 @@ inline std::size_t count_outside(std::span<const float> values, double low, doub
         std::ranges::count_if(values, [&](float v) { return v < low || v > high; }));
 }
 
-/// A quaternion of length 1 without its largest component, which is taken positive.
+/// A unit quaternion without its largest component, which is taken to be positive.
 struct SmallestThree {
     std::size_t largest = 0;
     std::array<double, 3> others{};  // in order, each in [-sqrt(1/2), sqrt(1/2)]
 };
 
-/// q: in any fixed order of components. One without length means nothing: encode_splats leaves such
-/// splats out.
+/// q: its components in any fixed order. The result is meaningless where q has no length;
+/// encode_splats leaves such splats out.
 inline SmallestThree smallest_three(const std::array<double, 4>& q) {
     SmallestThree result;
     double square = 0;
@@ -83,7 +83,7 @@ inline std::array<double, 4> whole_quaternion(const SmallestThree& three) {
     return q;
 }
 
-/// Little-endian value at byte `at`; the caller checks the length.
+/// Reads a little-endian value at byte `at`; the caller checks the length.
 template <class T>
 T load_le(std::span<const std::byte> bytes, std::size_t at) {
     T value;
@@ -91,7 +91,7 @@ T load_le(std::span<const std::byte> bytes, std::size_t at) {
     return value;
 }
 
-// float16 of files, as float32.
+// Reads the float16 numbers of files as float32.
 
 /// IEEE 754 binary16.
 inline float half_to_float(std::uint16_t bits) {

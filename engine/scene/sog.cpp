@@ -1,5 +1,9 @@
 #include "engine/scene/sog.h"
 
+#include <fmt/format.h>
+#include <webp/decode.h>
+#include <webp/encode.h>
+#include <zip.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,7 +11,6 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <fmt/format.h>
 #include <functional>
 #include <future>
 #include <limits>
@@ -18,9 +21,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-#include <webp/decode.h>
-#include <webp/encode.h>
-#include <zip.h>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -38,15 +38,15 @@
 
 namespace darb {
 
-/// The bytes of a part, by its name in meta.json. Throws Error where there is none.
+/// Gives the bytes of a part, by its name in meta.json. Throws Error where there is none.
 using SogPart = std::function<std::vector<std::byte>(const std::string& name)>;
 
-/// zip has to outlive what is returned.
+/// zip must outlive the result.
 SogPart open_sog_zip(std::span<const std::byte> zip, const std::string& where);
-/// Names with folders are refused.
+/// Refuses names with folders.
 SogPart open_sog_folder(const std::filesystem::path& folder);
 
-/// Stored, not compressed again; the same parts give the same bytes.
+/// Entries are stored, not compressed again; equal parts give equal bytes.
 std::vector<std::byte> make_sog_zip(
     const std::vector<std::pair<std::string, std::vector<std::byte>>>& parts,
     const std::string& where);
@@ -56,7 +56,7 @@ struct SogImage {
     std::vector<std::uint8_t> rgba;     // [H][W][4]
 };
 
-/// Throws Error where the bytes are no WebP, or a picture of more than `most` pixels.
+/// Throws Error where the bytes are not WebP, or the picture has more than `most` pixels.
 SogImage decode_webp(std::span<const std::byte> bytes, std::size_t most, const std::string& where);
 
 namespace {
@@ -65,7 +65,7 @@ using nlohmann::json;
 
 constexpr std::size_t kPaletteRow = 64;         // entries a row of shN_centroids
 constexpr std::size_t kMostPalette = 65536;     // entries
-constexpr std::size_t kSparePixels = 1u << 20;  // of the pictures, beyond four times the splats
+constexpr std::size_t kSparePixels = 1u << 20;  // pictures may hold four times the splats and this
 constexpr std::uint64_t kSplatBytes = 4 * splat_floats(kMaxShDegree);
 
 using Codebook = std::array<float, 256>;
@@ -95,8 +95,7 @@ struct Scene {
         return image;
     }
 
-    /// Indices beyond its end, and values that are null, give NaN; splats that use them are
-    /// dropped.
+    /// Null values, and indices beyond the end, give NaN; splats that use them are dropped.
     Codebook codebook(const char* group) const {
         Codebook book;
         book.fill(std::numeric_limits<float>::quiet_NaN());
@@ -112,7 +111,8 @@ struct Scene {
     }
 };
 
-/// Between two positions, at the median of each axis: 1/65,535 of the range of sign(x) ln(1 + |x|).
+/// The step between two positions at the median of each axis: 1/65,535 of the range of sign(x) ln(1
+/// + |x|).
 double step_of(const json& meta, const std::vector<double>& positions) {
     double step = 0;
     std::vector<double> places(positions.size() / 3);
@@ -225,7 +225,7 @@ void check_version(const json& meta, const std::string& where) {
                     "Convert it with PlayCanvas's splat-transform first.");
 }
 
-/// By the format, or as splat-transform tags it.
+/// By the format's key, or by the tag that splat-transform writes.
 bool is_antialiased(const json& meta) {
     return meta.value("antialias", json()) == true || meta.value("model", json()) == "antialiased";
 }
@@ -371,7 +371,7 @@ std::vector<std::byte> read_entry(zip_t* archive, const std::string& name, std::
                         kCopyAgain);
         done += static_cast<std::size_t>(got);
     }
-    // The checksum counts where the end is met.
+    // The checksum is verified when the end is reached.
     std::byte beyond{};
     if (const zip_int64_t more = zip_fread(entry.get(), &beyond, 1); more != 0)
         throw Error(place,
@@ -381,7 +381,7 @@ std::vector<std::byte> read_entry(zip_t* archive, const std::string& name, std::
     return bytes;
 }
 
-/// Of a scene that has to be unpacked first; empty where there is none.
+/// The name of a scene in the archive, which has to be unpacked first; empty where there is none.
 std::string packed_scene(zip_t* archive) {
     for (zip_int64_t i = 0; i < zip_get_num_entries(archive, 0); ++i)
         if (const char* name = zip_get_name(archive, static_cast<zip_uint64_t>(i), 0))
@@ -389,7 +389,7 @@ std::string packed_scene(zip_t* archive) {
     return {};
 }
 
-/// meta.json names files beside it, none in other folders.
+/// meta.json may name files beside it, but none in other folders.
 void check_part_name(const std::string& name, const std::string& meta) {
     if (name.empty() || std::filesystem::path(name).filename() != name || name == "..")
         throw Error(meta, "names '" + name + "', which is no file of its folder",
@@ -483,13 +483,13 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kChunkNeighbours = 256;  // splats that lie close together, for chunk_order
-constexpr std::size_t kRowEntries = 64;        // palette entries a row of pixels
+constexpr std::size_t kChunkNeighbours = 256;  // splats in a chunk for chunk_order
+constexpr std::size_t kRowEntries = 64;        // palette entries in a row of pixels
 constexpr std::size_t kPaletteStep = 1024, kMostSteps = 64;
-constexpr int kWebpEffort = 4;            // of 9
-constexpr std::size_t kMostSide = 16383;  // px, of WebP
+constexpr int kWebpEffort = 4;            // on libwebp's scale to 9
+constexpr std::size_t kMostSide = 16383;  // WebP's limit, px
 
-/// Its pixels are set one by one; those that are not are 0 0 0 255.
+/// A picture whose pixels are set one by one; the others are 0 0 0 255.
 struct Plane {
     std::string name;
     SogImage image;
@@ -503,7 +503,7 @@ Plane plane_of(std::string name, std::size_t width, std::size_t height) {
     return plane;
 }
 
-/// A pixel a splat; sides are multiples of 4.
+/// One pixel per splat; sides are multiples of 4.
 Plane plane_for(std::string name, std::size_t splats) {
     const auto side = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(splats))));
     const std::size_t width = (side + 3) / 4 * 4;
@@ -519,7 +519,7 @@ std::vector<std::byte> encode_webp(const SogImage& image, const std::string& whe
         !WebPConfigLosslessPreset(&config, kWebpEffort))
         throw Error(where, "the WebP library is of another version than its headers",
                     "Install libwebp again, and build darb anew.");
-    config.exact = 1;  // the colours under an alpha of 0 count
+    config.exact = 1;  // keep colours where alpha is 0
     picture.use_argb = 1;
     picture.width = static_cast<int>(image.width);
     picture.height = static_cast<int>(image.height);
@@ -590,7 +590,7 @@ void write_quats(const SplatModel& model, json& meta, std::vector<Plane>& planes
     planes.push_back(std::move(plane));
 }
 
-/// Three indices a splat into a codebook of their own.
+/// Writes three indices per splat into a codebook made for them.
 Plane write_indexed(const char* group, const std::vector<float>& values, json& meta) {
     Plane plane = plane_for(fmt::format("{}.webp", group), values.size() / 3);
     const Codebook256 book = codebook_of(values);
@@ -609,7 +609,7 @@ void write_scales_and_colours(const SplatModel& model, json& meta, std::vector<P
         planes.back().pixel(i)[3] = byte_of_logit(model.opacity_logit[i]);
 }
 
-/// As many as PlayCanvas's writers make of so many splats.
+/// The size that PlayCanvas's writers choose for this number of splats.
 std::size_t palette_size(std::size_t splats) {
     std::size_t steps = 1;
     while (2 * steps * kPaletteStep <= splats && steps < kMostSteps) steps *= 2;

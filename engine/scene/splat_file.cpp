@@ -1,8 +1,8 @@
 #include "engine/scene/splat_file.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
-#include <fmt/format.h>
 #include <new>
 
 #include "engine/core/error.h"
@@ -45,7 +45,7 @@ bool ends_so(const std::string& name, const std::string& ending) {
     return ending.starts_with('.') ? name.ends_with(ending) : name == ending;
 }
 
-/// The scene without what is left out; the scene itself, and no copy, where that is nothing.
+/// The scene without what cannot be written; where that is nothing, the scene itself, not a copy.
 const SplatModel& writable(SplatFormat format, const SplatModel& scene, SplatModel& copy,
                            std::size_t& dropped) {
     dropped = 0;
@@ -64,7 +64,7 @@ void check_shape_has_a_place(const SplatFormatRow& row, const SplatModel& model,
                 "Write .ply, or the nearest Gaussians: darb convert --kernel gaussian.");
 }
 
-/// What the user says of the values, and what they look like.
+/// Applies what the user says about the values, and notes what they look like.
 void settle_units(const StoredUnits& units, const std::string& where, SplatFile& facts,
                   SplatModel& model) {
     const bool by_channel =
@@ -204,7 +204,7 @@ fs::path run_of_scene(const fs::path& file) {
 std::string scene_name(const fs::path& path, bool with_ending) {
     std::error_code none;
     fs::path whole = fs::absolute(path, none).lexically_normal();
-    if (!whole.has_filename()) whole = whole.parent_path();  // a folder with its slash
+    if (!whole.has_filename()) whole = whole.parent_path();  // the path ends in a slash
     if (names_scene_folder(whole)) whole = whole.parent_path();
     const fs::path run = run_of_scene(whole);
     if (!run.empty()) whole = run;

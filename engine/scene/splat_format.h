@@ -1,4 +1,4 @@
-// What is known of a format of splat files: its row in the table of splat_file.h. Only the
+// What is known about a format of splat files: its row in the table of splat_file.h. Only the
 // formats themselves and splat_file.cpp include this.
 #pragma once
 
@@ -12,44 +12,45 @@
 
 namespace darb {
 
-/// What a reader gets.
+/// The input of a reader.
 struct SplatSource {
     std::span<const std::byte> bytes;
     std::string where;             // the file's name, in errors
-    std::filesystem::path folder;  // of files beside it; empty: there are none to be read
+    std::filesystem::path folder;  // where files beside it are; empty: none can be read
     ReadProgress progress;         // may be empty
-    ReadPoints read_points = {};   // of a PLY that is a point cloud; may be empty
-    StoredUnits units = {};        // that parse_splats applies to what is read
+    ReadPoints read_points = {};   // for a PLY that is a point cloud; may be empty
+    StoredUnits units = {};        // parse_splats applies these to the result
 };
 
-/// What a format has a place for beyond Gaussians with their harmonics; bits.
+/// What a format can store beyond Gaussians; bits.
 enum SplatFeature : unsigned {
-    kKeepsKernel = 1,  // and footprint
+    kKeepsKernel = 1,  // and the footprint
     kKeepsRenderMode = 2,
     kKeepsHarmonics = 4,
-    kKeepsDoublePositions = 8,  // or `cuts` says what becomes of them
-    kKeepsUnturned = 16,        // splats without a rotation, which are not drawn
-    kKeepsShape = 32,           // of each splat; what does not refuses a kernel with shapes
+    kKeepsDoublePositions = 8,  // or `cuts` says what happens to them
+    kKeepsUnturned = 16,        // splats without a rotation, which are never drawn
+    kKeepsShape = 32,           // one per splat; other formats refuse kernels with shapes
 };
 
 struct SplatFormatRow {
-    const char* name;  // in sentences
-    /// What a name ends in that asks for this format when writing; without a dot at its beginning:
-    /// the whole name. The longest that fits wins.
+    const char* name;  // as in sentences
+    /// File name endings that ask for this format when writing; one without a leading dot is a
+    /// whole file name. The longest that matches wins.
     std::vector<std::string> endings;
-    /// The file that a folder is known by which is a scene of this format; null: none is.
+    /// The file by which a folder is recognised as a scene of this format; null: there is none.
     const char* folder_file = nullptr;
-    /// By content; null: the reader of another row finds it. Throws Error as parse does.
+    /// Recognises the content; null: another row's reader finds it. Throws Error as parse does.
     bool (*recognise)(const SplatSource&) = nullptr;
-    /// Throws Error naming file, place, reason and remedy. Sets what it knows of `file`.
+    /// Sets what it knows about `file`. Throws Error naming file, place, reason and remedy.
     SplatModel (*parse)(const SplatSource&, SplatFile& file) = nullptr;
-    /// null: the format is not written. The model has been through drop_unwritable.
+    /// null: the format cannot be written. The model has been through drop_unwritable.
     EncodedSplats (*encode)(const SplatModel&, const std::string& where,
                             const EncodeOptions&) = nullptr;
     unsigned keeps = 0;  // SplatFeature
-    /// What lies beyond its ranges, a sentence each; null: nothing does. Throws as encode does.
+    /// What exceeds the format's ranges, one sentence each; null: nothing can. Throws as encode
+    /// does.
     std::vector<std::string> (*cuts)(const SplatModel&, const std::string& where) = nullptr;
-    /// How many EncodeOptions::precision counts; null: one.
+    /// How many values EncodeOptions::precision has; null: one.
     int (*precisions)(const SplatModel&) = nullptr;
 };
 
@@ -57,7 +58,7 @@ struct SplatFormatRow {
 DARB_SPLAT_FORMATS(DARB_SPLAT_FORMAT)
 #undef DARB_SPLAT_FORMAT
 
-/// Whether the bytes begin with the text.
+/// Whether the bytes begin with `text`.
 bool starts_with(std::span<const std::byte> bytes, std::string_view text);
 
 }  // namespace darb

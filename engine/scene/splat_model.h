@@ -1,5 +1,5 @@
-// SplatModel: the parameters of N splats as they are trained and stored (float32, host side).
-// C = (sh_degree + 1)^2 coefficients per colour; SH order and sign as in 3DGS.
+// SplatModel: the parameters of N splats as they are trained and stored (float32, on the host). C =
+// (sh_degree + 1)^2 coefficients per colour; SH order and signs as in 3DGS.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ enum Attribute {
     kAttributeCount = ATTRIBUTES
 };
 
-/// Values or gradients of N splats, an array each; T: float, double in the reference.
+/// Values or gradients of N splats, one array per attribute. T: float, or double in the reference.
 template <class T>
 struct SplatArrays {
     std::vector<T> position;       // [N][3] world
@@ -36,7 +36,8 @@ struct SplatArrays {
     std::vector<T> opacity_logit;  // [N]
     std::vector<T> sh_dc;          // [N][3]; colour = 0.5 + SH_C0 * dc
     std::vector<T> sh_rest;        // [N][C-1][3]: coefficient-major, rgb innermost
-    std::vector<T> shape;          // [N] of a kernel with shapes, engine/kernels/shaped_kernel.h
+    std::vector<T> shape;          // [N] for kernels with shapes, engine/kernels/shaped_kernel.h;
+                                   // else empty
 };
 
 /// The array of an attribute.
@@ -55,15 +56,16 @@ const std::vector<T>& attribute_values(const SplatArrays<T>& arrays, int attribu
 }
 
 struct SplatAttribute {
-    const char* name;           // of buffers and in messages; d_<name> is its gradient
-    const char* file_name;      // of dumps, and of PLY columns: see ply_column
-    int file_place;             // of its columns in a PLY
-    std::uint32_t floats;       // of a splat
-    bool per_coefficient;       // so many for each harmonic above the first; files go by channel
-    bool optional;              // a model may have none: its array is empty, its buffers too
-    bool copied_to_new;         // by density control, before a pass changes it; false: starts at 0
+    const char* name;           // name of its buffers and in messages; d_<name> is its gradient
+    const char* file_name;      // name in dumps and PLY columns: see ply_column
+    int file_place;             // position of its columns in a PLY
+    std::uint32_t floats;       // number of floats per splat
+    bool per_coefficient;       // `floats` for each harmonic above the first; files store them
+                                // channel by channel
+    bool optional;              // a model may lack it: then its array and buffers are empty
+    bool copied_to_new;         // density control copies it to new splats; false: it starts at 0
     int step;                   // STEP_*
-    float (*from_file)(float);  // which infinities mean something; null: none
+    float (*from_file)(float);  // which infinities are meaningful; null: none
 };
 
 constexpr std::array<SplatAttribute, kAttributeCount> kSplatAttributes{{
@@ -80,14 +82,14 @@ constexpr const char* attribute_name(int attribute) {
     return kSplatAttributes[static_cast<std::size_t>(attribute)].name;
 }
 
-/// Floats of a splat, of an optional attribute where it is there.
+/// Number of floats per splat; for an optional attribute, of a model that has it.
 constexpr std::uint32_t attribute_floats(int attribute, int sh_degree) {
     const SplatAttribute& row = kSplatAttributes[static_cast<std::size_t>(attribute)];
     const auto bands = static_cast<std::uint32_t>(sh_degree + 1);
     return row.per_coefficient ? row.floats * (bands * bands - 1) : row.floats;
 }
 
-/// Of all attributes that no model lacks.
+/// Floats per splat, over all attributes that are not optional.
 constexpr std::uint32_t splat_floats(int sh_degree) {
     std::uint32_t sum = 0;
     for (int a = 0; a < kAttributeCount; ++a)
@@ -105,7 +107,7 @@ constexpr std::array<int, kAttributeCount> attributes_in_file_order() {
     return order;
 }
 
-/// Where float c of a splat stands among the columns of its attribute in files, which hold
+/// The column of float c of a splat among the columns of its attribute in files, which store
 /// harmonics channel by channel: all red, then green, then blue.
 constexpr std::size_t file_column(int attribute, int sh_degree, std::size_t c) {
     const SplatAttribute& row = kSplatAttributes[static_cast<std::size_t>(attribute)];
@@ -114,7 +116,8 @@ constexpr std::size_t file_column(int attribute, int sh_degree, std::size_t c) {
     return c % row.floats * coefficients + c / row.floats;
 }
 
-/// The PLY property of a column: x y z; the file name alone where there is one; else name_0 ...
+/// The PLY property of a column: x y z; the file name alone where there is one column; else name_0
+/// ...
 std::string ply_column(int attribute, std::size_t column);
 
 struct SplatModel : SplatArrays<float> {
@@ -126,20 +129,20 @@ struct SplatModel : SplatArrays<float> {
 
     size_t size() const { return opacity_logit.size(); }
     int rest_count() const { return static_cast<int>(attribute_floats(kShRest, sh_degree)); }
-    /// Floats of a splat; 0 of an optional attribute that is not there.
+    /// Number of floats per splat; 0 for an optional attribute that the model lacks.
     std::uint32_t floats(int attribute) const {
         const bool held = !kSplatAttributes[static_cast<size_t>(attribute)].optional ||
                           !attribute_values(*this, attribute).empty();
         return held ? attribute_floats(attribute, sh_degree) : 0;
     }
-    /// All arrays but those of optional attributes that are not there.
+    /// Resizes all arrays, except those of optional attributes that the model lacks.
     void resize(size_t count) {
         for (int a = 0; a < kAttributeCount; ++a)
             attribute_values(*this, a).resize(count * floats(a));
     }
 };
 
-/// The opacity that a logit stands for, 0 to 1.
+/// The opacity, 0 to 1, for a logit.
 inline double sigmoid(double logit) {
     return 1 / (1 + std::exp(-logit));
 }

@@ -8,16 +8,17 @@
 
 namespace darb {
 
-/// Throws Error where the degree or the length of an array is wrong, or splats of a kernel with
-/// shapes have none.
+/// Throws Error where the degree or the length of an array is wrong, or the kernel needs shapes and
+/// the splats have none.
 void check_splat_shapes(const SplatModel& model);
 
-/// Whether splats of this kernel hold an attribute: an optional one is the kernel's own.
+/// Whether splats of this kernel have an attribute: optional ones depend on the kernel.
 bool kernel_takes(int kernel, int attribute);
-/// Sets the kernel. Splats that had no shape get 0, the start, where it takes one; they lose theirs
-/// where it takes none.
+/// Sets the kernel. Where it takes shapes, splats without one get 0, the start value; where it does
+/// not, shapes are removed.
 void set_kernel(SplatModel& model, int kernel);
-/// The same for what was read: a note where its kernel takes shapes and the file has none.
+/// The same for a scene that was read: adds a note where its kernel takes shapes but the file has
+/// none.
 void settle_shapes(SplatModel& model, std::vector<std::string>& notes);
 
 }  // namespace darb

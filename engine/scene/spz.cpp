@@ -1,9 +1,9 @@
 #include "engine/scene/spz.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <fmt/format.h>
 #include <numbers>
 
 #include "engine/core/error.h"
@@ -57,8 +57,8 @@ Header read_header(Bytes bytes, const std::string& where) {
     return header;
 }
 
-/// The attributes, uncompressed, in the order of the file; where versions 1 to 3 have extensions,
-/// what follows the attributes.
+/// The uncompressed attributes in file order; in versions 1 to 3 with extensions, also what follows
+/// them.
 struct Content {
     Header header;
     std::vector<std::byte> whole;  // versions 1 to 3
@@ -94,7 +94,7 @@ void read_old(Bytes file, bool is_gzip, Content& content, const std::string& whe
             spz::strides(static_cast<int>(content.header.version), content.header.degree).total() *
             std::uint64_t{content.header.count};
         check_expansion(file.size(), size, where);
-        // A byte more than needed: zlib then reaches the end of the stream and checks its sum.
+        // One byte more than needed makes zlib reach the end of the stream and verify its checksum.
         const bool extended = content.header.flags & spz::kFlagExtensions;
         const std::size_t most = spz::kOldHeader + size + (extended ? kMostExtensionBytes : 1);
         content.whole = gunzip(file, most, where);
@@ -153,10 +153,10 @@ void read_streams(Bytes file, Content& content, const std::string& where) {
                     kCopyAgain);
 }
 
-/// Columns: the axes of the file in the frame of the model (x right, y down, z forward). Numbers 1
-/// to 16 as the reference library has them: with n - 1 in bits, bit 0 is right against left; the
-/// second axis is down or up (bit 1) and the third back or front (bit 2), or, with bit 3, the
-/// second front or back (bit 2) and the third down or up (bit 1).
+/// Columns: the axes of the file in the model's frame (x right, y down, z forward). Numbers 1 to 16
+/// are those of the reference library, with n - 1 in bits: bit 0 is right or left; the second axis
+/// is down or up (bit 1) and the third back or front (bit 2), or, with bit 3, the second is front
+/// or back (bit 2) and the third down or up (bit 1).
 glm::dmat3 frame_of(std::uint32_t system) {
     const std::uint32_t bits = system - 1;
     const bool rotated = bits & 8;
@@ -168,8 +168,9 @@ glm::dmat3 frame_of(std::uint32_t system) {
 
 constexpr std::uint32_t kRightUpBack = 4;
 
-/// In versions 1 to 3 the records are whatever follows the attributes: one that does not fit ends
-/// them (facts.extensions_cut). In version 4 their length is declared, and it is an Error.
+/// In versions 1 to 3, the records are whatever follows the attributes, and end where one does not
+/// fit (facts.extensions_cut). In version 4 their length is declared, and one that does not fit is
+/// an Error.
 std::uint32_t read_extensions(Bytes records, int version, const std::string& where,
                               SpzFacts& facts) {
     std::uint32_t system = kRightUpBack;
@@ -209,7 +210,7 @@ void read_positions(const Content& content, SplatModel& model) {
         std::uint32_t value = 0;
         for (std::size_t k = 0; k < 3; ++k)
             value |= static_cast<std::uint32_t>(bytes[3 * i + k]) << (8 * k + 8);
-        const int fixed = static_cast<std::int32_t>(value) >> 8;  // with its sign
+        const int fixed = static_cast<std::int32_t>(value) >> 8;  // including the sign
         model.position[i] = static_cast<float>(std::ldexp(fixed, -content.header.fractional_bits));
     }
 }
@@ -227,7 +228,7 @@ std::array<double, 4> rotation_of(const Content& content, std::size_t i) {
         }
         return whole_quaternion(three);
     }
-    SmallestThree xyz{3, {}};  // w is left out, largest or not
+    SmallestThree xyz{3, {}};  // w is left out, whether or not it is the largest
     for (std::size_t k = 0; k < 3; ++k)
         xyz.others[k] = static_cast<double>(bytes[3 * i + k]) / 127.5 - 1;
     return whole_quaternion(xyz);
@@ -259,8 +260,8 @@ SplatModel decode(const Content& content) {
     return model;
 }
 
-/// RFC 1952: the magic, deflate as the method, and no reserved flag; a .splat may begin with the
-/// first two bytes.
+/// RFC 1952: the magic number, deflate as the method, and no reserved flag; a .splat might begin
+/// with the first two bytes.
 bool is_gzip(Bytes file) {
     return file.size() >= 4 && file[0] == std::byte{0x1f} && file[1] == std::byte{0x8b} &&
            file[2] == std::byte{8} && (file[3] & std::byte{0xe0}) == std::byte{0};
@@ -319,7 +320,7 @@ const SplatFormatRow& spz_format() {
                     encode_spz(model, where, options.spz_version,
                                options.precision < 0 ? kSpzPrecisions - 1 : options.precision)};
             },
-        // Positions are steps of their own, of which spz_losses says the size.
+        // Positions have steps of their own, whose size spz_losses reports.
         .keeps = kKeepsRenderMode | kKeepsHarmonics | kKeepsDoublePositions,
         .cuts = spz_losses,
         .precisions =
@@ -332,11 +333,11 @@ namespace {
 using Stream = std::vector<std::byte>;
 
 constexpr int kUsualBits = 12;   // fractional; 0.24 mm where the unit is a metre
-constexpr int kLeastSteps = 17;  // 2^17 of them across the largest coordinate, where they fit
+constexpr int kLeastSteps = 17;  // the largest coordinate has 2^17 steps, where they fit
 constexpr int kSteps = 23;       // 24 bits with sign
-constexpr int kCoarsestOfDegree1 = 8, kCoarsestOfHigher = 16;  // of the reference writer
+constexpr int kCoarsestOfDegree1 = 8, kCoarsestOfHigher = 16;  // as in the reference writer
 
-// Where bytes end, and half a step of each, which is rounding.
+// The ranges of bytes, and half a step of each, which is rounding.
 constexpr double kLeastLogScale = -10, kMostLogScale = 255 / 16.0 - 10, kHalfLogScale = 1 / 32.0;
 constexpr double kMostDc = 0.5 / spz::kColourScale, kHalfDc = kMostDc / 255;
 constexpr double kLeastHarmonic = -1, kMostHarmonic = 127 / 128.0;
@@ -468,7 +469,7 @@ std::vector<std::byte> encode_spz(const SplatModel& scene, const std::string& wh
         for (const Stream& stream : streams) file.insert(file.end(), stream.begin(), stream.end());
         return gzip(file);
     }
-    append(spz::kHeader, 4, file);  // where the table begins
+    append(spz::kHeader, 4, file);  // offset of the table
     file.resize(spz::kHeader);
     Stream packed;
     for (const Stream& stream : streams) {

@@ -21,26 +21,26 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kLeastSplats = 8;  // fewer may be like anything
-// Formats of few bits round what was put into them.
+constexpr std::size_t kLeastSplats = 8;  // fewer may look like anything
+// Formats with few bits round the values.
 constexpr double kRounded = 0.02;
 
-constexpr std::size_t kMostSampled = 20'000;        // splats, of medians
+constexpr std::size_t kMostSampled = 20'000;        // splats that medians are taken over
 constexpr std::size_t kMostNeighbours = 1'000'000;  // splats among which neighbours are looked for
 constexpr std::size_t kProbes = 128;                // splats whose neighbours are looked for
-// Of rotations.
+// Thresholds for rotations.
 constexpr double kMostOfOneComponent = 0.5;  // share of the squares
 constexpr std::size_t kFlatProbes = 2000, kLeastFlat = 100, kMostBeside = 30'000;
 constexpr double kFlat = 0.7;      // the shortest axis is half as long as the next
-constexpr double kDeviations = 3;  // of the mean from 0
-// Of harmonics: those of photos have 0.6 to 0.9, read in the wrong order 0.
+constexpr double kDeviations = 3;  // the mean must be this many standard errors from 0
+// Correlation of harmonics: those of photos have 0.6 to 0.9, and 0 when read in the wrong order.
 constexpr double kCorrelated = 0.4;
 constexpr std::size_t kLeastCorrelated = 100;  // splats
 constexpr double kLargestLogit = 20;
 constexpr double kLeastOfColours = 0.4;  // all of a scene within less is plain
-constexpr double kLargestDc = 20;        // of a colour six times as bright as white
-// Steps of positions, of a splat's size. Formats of few bits round on purpose, and by less than
-// half of a splat it does not show.
+constexpr double kLargestDc = 20;        // a colour six times as bright as white
+// Steps of positions, as a share of a splat's size. Formats with few bits round on purpose, and
+// less than half of a splat does not show.
 constexpr double kCoarseFloat = 0.1, kCoarseFormat = 0.5;
 
 struct Range {
@@ -55,7 +55,7 @@ struct Range {
     bool within(double low, double high) const { return least >= low && most <= high; }
 };
 
-/// Every so many splats, so that at most `most` are looked at.
+/// The stride at which at most `most` splats are looked at.
 std::size_t stride(const SplatModel& model, std::size_t most) {
     return std::max<std::size_t>(1, model.size() / most);
 }
@@ -68,10 +68,10 @@ glm::dvec3 local_position(const SplatModel& model, std::size_t i) {
     return {model.position[3 * i], model.position[3 * i + 1], model.position[3 * i + 2]};
 }
 
-/// Squared distances to splats, with these, ascending.
+/// Squared distances and indices of splats, ascending.
 using Neighbours = std::vector<std::pair<double, std::size_t>>;
 
-/// The nearest `count` of `among` splats that are spread over the file, or fewer.
+/// The nearest `count` among `among` splats that are spread over the file, or fewer.
 Neighbours nearest_splats(const SplatModel& model, std::size_t probe, std::size_t count,
                           std::size_t among) {
     const glm::dvec3 at = local_position(model, probe);
@@ -86,7 +86,7 @@ Neighbours nearest_splats(const SplatModel& model, std::size_t probe, std::size_
     return found;
 }
 
-/// Splats spread over the file.
+/// Indices of splats, spread over the file.
 std::vector<std::size_t> probes_of(const SplatModel& model, std::size_t count) {
     std::vector<std::size_t> probes;
     const std::size_t step = stride(model, count);
@@ -100,8 +100,9 @@ double largest_scale(const SplatModel& model, std::size_t splat) {
     return std::max({s[0], s[1], s[2]});
 }
 
-/// Trained splats are 0.8 to 3.2 times as large as the distance to their neighbours, by the median.
-/// As a logarithm x stands for e^x, at least e times x, so that one of both readings is far off.
+/// The median of trained splats is 0.8 to 3.2 times as large as the distance to their neighbours.
+/// Read as a logarithm, x stands for e^x, at least e times x, so one of the two readings is far
+/// off.
 constexpr double kUsualOverlap = 1.3;
 
 bool are_lengths(const SplatModel& model) {
@@ -136,9 +137,9 @@ glm::dvec3 short_axis(const float* q, const float* log_scale, bool xyzw) {
     return glm::mat3_cast(glm::normalize(turn))[axis];
 }
 
-/// Trained splats lie in the surfaces that they are of: their neighbours are found beside them
-/// rather than along their shortest axis. A turn of the scene by 180 degrees gives the component of
-/// one axis the size that that of the angle usually has, so that this alone says nothing.
+/// Trained splats lie in the surfaces that they represent: their neighbours are beside them rather
+/// than along their shortest axis. Turning the scene by 180 degrees gives the component of one axis
+/// the usual size of that of the angle, so component sizes alone say nothing.
 bool are_xyzw(const SplatModel& model) {
     std::array<double, 4> square{};
     for (const std::size_t i : probes_of(model, kMostSampled)) {
@@ -175,19 +176,19 @@ bool are_xyzw(const SplatModel& model) {
 
 // ---- harmonics
 
-/// Where in the model the value stands that a file in the other order has for a coefficient and
-/// channel, of `coefficients` above the first.
+/// Where the model has the value that a file in the other order stores for a coefficient and
+/// channel, with `coefficients` above the first.
 std::size_t swapped_place(std::size_t coefficient, std::size_t channel, std::size_t coefficients,
                           bool by_channel) {
-    if (by_channel) {  // the file is coefficient by coefficient, and was read channel by channel
+    if (by_channel) {  // the file is coefficient by coefficient, but was read channel by channel
         const std::size_t column = 3 * coefficient + channel;
         return column % coefficients * 3 + column / coefficients;
     }
     return channel * coefficients + coefficient;
 }
 
-/// The mean correlation of green and blue with red: light has little colour, so that they follow
-/// each other where they are those of one coefficient.
+/// The mean correlation of green and blue with red. Light has little colour, so they follow each
+/// other where they belong to one coefficient.
 template <class Place>
 double correlation(const SplatModel& model, std::size_t coefficients, const Place& place) {
     double sum = 0, count = 0;
@@ -229,7 +230,8 @@ StoredOpacities opacities_of(const SplatModel& model) {
     const bool one_value = range.least == range.most;
     if (range.within(-kRounded, 1 + kRounded) && (!one_value || range.least == 1))
         return StoredOpacities::linear;
-    // A logit of 20 differs from an opacity of 1 by a billionth, and steps of 1 are no training's.
+    // A logit of 20 differs from an opacity of 1 by a billionth, and training never gives whole
+    // numbers.
     if (range.within(0, 255) && range.whole && range.most > kLargestLogit && !one_value)
         return StoredOpacities::bytes;
     return StoredOpacities::logits;
@@ -367,7 +369,7 @@ std::string position_doubt(const SplatModel& model, double step) {
                 places.push_back(std::abs(from + double{model.position[3 * i + axis]}));
             return nearest_rank(places, 0.5);
         };
-        double far = middle(origin);  // places are now those of the world
+        double far = middle(origin);  // places are now world coordinates
         if (origin != 0 && !(float32_step(far) > kCoarseFloat * size && were_float32(places)))
             far = middle(0);
         farthest = std::max(farthest, far);

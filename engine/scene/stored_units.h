@@ -1,7 +1,7 @@
-// What a file that is no scene of 3DGS stores in the columns of one: scales that are no logarithms,
-// opacities that are no logits, colours in place of harmonics, quaternions in another order. Such a
-// file reads without an error and is drawn as fog. Here is what makes one of them right, and what
-// tells from all of a scene's values that it may be one.
+// Files with the columns of a 3DGS scene but other contents: scales that are not logarithms,
+// opacities that are not logits, colours instead of harmonics, quaternions in another order. Such a
+// file can be read without an error, but looks like fog when drawn. This converts such values, and
+// detects from all values of a scene that they may need it.
 #pragma once
 
 #include <string>
@@ -11,13 +11,13 @@
 
 namespace darb {
 
-enum class StoredScales { usual, logarithms, linear };  // usual: as the format has them
+enum class StoredScales { usual, logarithms, linear };  // usual: as the format defines
 enum class StoredOpacities { logits, linear, bytes };   // linear: 0 to 1; bytes: 0 to 255
-enum class StoredColours { harmonics, rgb, bytes };     // likewise
+enum class StoredColours { harmonics, rgb, bytes };     // rgb: 0 to 1; bytes: 0 to 255
 enum class StoredRotations { wxyz, xyzw };
 enum class StoredOrder { usual, swapped };
 
-/// What a user says of a file.
+/// What the user says about a file.
 struct StoredUnits {
     StoredScales scales{};
     StoredOpacities opacities{};
@@ -27,29 +27,30 @@ struct StoredUnits {
     bool operator==(const StoredUnits&) const = default;
 };
 
-/// Sets right what `units` says. by_channel: the format has harmonics channel by channel, as PLY
-/// does, so that `swapped` ones stand coefficient by coefficient; else the other way about. Throws
-/// Error where the scene has values that cannot be what is said.
+/// Converts the values as `units` says. by_channel: the format stores harmonics channel by channel,
+/// as PLY does, so that `swapped` ones are stored coefficient by coefficient; otherwise the
+/// reverse. Throws Error where the scene has values that contradict `units`.
 void apply_stored_units(const StoredUnits& units, bool by_channel, const std::string& where,
                         SplatModel& model);
 
-/// What in a scene, as it was read, is unlike any scene, a sentence each with the option of darb
-/// that reads it otherwise. A scene of fewer than 8 splats says too little. O(N).
+/// What is unlike a 3DGS scene in the values as they were read, one sentence each, with the
+/// option of darb that reads them otherwise. Scenes with fewer than 8 splats are not judged. O(N).
 std::vector<std::string> unit_doubts(const SplatModel& model, bool by_channel);
 
-/// Whether positions are coarse beside the sizes of the splats, a sentence; else empty. step: of
-/// the format's positions, world units; 0: that of float32 where the splats lie.
+/// A sentence where positions are coarse compared with the sizes of the splats; else empty. step:
+/// that of the format's positions, world units; 0: that of float32 where the splats lie.
 std::string position_doubt(const SplatModel& model, double step);
 
-/// Of a format that stores lengths, and has some below 0.
+/// For formats that store lengths, where some are below 0.
 inline constexpr const char* kScalesBelow0 =
     "has scales below 0, as logarithms are; --scales logarithms reads them as such";
 
-/// Whether values were float32 once, though text may have them with fewer digits: no two of them
-/// differ where float32 has them equal. Of many that lie closer than float32 resolves.
+/// Whether values may have been float32, although text may give them with fewer digits: no two
+/// different values are equal as float32. Meaningful for many values that lie closer together than
+/// float32 resolves.
 bool were_float32(std::vector<double> values);
 
-/// The distance between float32 numbers at `value`.
+/// The distance from `value` to the next float32 number.
 double float32_step(double value);
 
 }  // namespace darb

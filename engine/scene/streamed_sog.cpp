@@ -31,13 +31,13 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr int kMostLodDepth = 256;              // of the JSON
-constexpr std::size_t kLeafSplats = 16 << 10;   // of the finest level, at most
-constexpr std::size_t kFileSplats = 256 << 10;  // of a file; a leaf is never cut
+constexpr int kMostLodDepth = 256;              // nesting of the JSON
+constexpr std::size_t kLeafSplats = 16 << 10;   // most splats in a leaf of the finest level
+constexpr std::size_t kFileSplats = 256 << 10;  // splats per file; a leaf is never split
 constexpr std::size_t kLeastLevel = 500;        // splats
 constexpr std::size_t kLeafNeighbours = 256;    // for chunk_order
 
-/// Rows of a file.
+/// A range of rows in a file.
 struct LodRange {
     std::size_t file = 0, offset = 0, count = 0;
 };
@@ -49,7 +49,8 @@ std::size_t lod_number(const json& object, const char* key) {
     return value.get<std::size_t>();
 }
 
-/// The level of every leaf that has it, in the order of the tree; nothing: of each its finest.
+/// The ranges of the wanted level, over all leaves that have it, in the order of the tree; without
+/// `wanted`, the finest level of each leaf.
 std::vector<LodRange> ranges_of(const json& tree, std::optional<std::size_t> wanted) {
     std::vector<LodRange> ranges;
     std::vector<const json*> stack{&tree};
@@ -74,7 +75,7 @@ std::vector<LodRange> ranges_of(const json& tree, std::optional<std::size_t> wan
     return ranges;
 }
 
-/// The folder of a file of the list, which is below that of the lod-meta.json.
+/// The folder of a listed file, which must be below that of lod-meta.json.
 fs::path chunk_folder(const fs::path& folder, const std::string& name, const std::string& where) {
     const fs::path path = name;
     const bool outside = path.filename() != "meta.json" || path.is_absolute() ||
@@ -117,7 +118,7 @@ json parse_lod(const SplatSource& source) {
     return json::parse(begin, begin + source.bytes.size(), limit);
 }
 
-/// Each file that is named is read once, whole.
+/// Each named file is read once, as a whole.
 std::map<std::size_t, SplatModel> read_chunks_of(const json& meta, const SplatSource& source,
                                                  const std::vector<LodRange>& ranges,
                                                  SplatFile& file) {
@@ -196,20 +197,21 @@ SplatModel load_streamed(const SplatSource& source, SplatFile& file) {
     return load_level(source, file, std::nullopt);
 }
 
-/// What is written: the levels, and for each leaf which splats of each level it has.
+/// The state of writing: the levels, and which splats of each level are in a leaf.
 struct LodWriter {
     std::vector<const SplatModel*> levels;
     EncodeOptions options;
     std::string where;
-    std::vector<std::vector<std::uint32_t>> filling;  // splats of each level's last file, in order
-    std::vector<std::size_t> files;                   // of each level
+    std::vector<std::vector<std::uint32_t>> filling;  // [level] splats of the file that is being
+                                                      // filled, in order
+    std::vector<std::size_t> files;                   // number of files, by level
     std::vector<std::size_t> counts;
-    std::size_t written = 0, all = 0;  // splats of all levels
+    std::size_t written = 0, all = 0;  // splats over all levels
     json filenames = json::array();
     EncodedSplats encoded;
 };
 
-using LodSplats = std::vector<std::vector<std::uint32_t>>;  // of each level
+using LodSplats = std::vector<std::vector<std::uint32_t>>;  // [level] indices of splats
 
 json bound_of(const LodWriter& writer, const LodSplats& splats) {
     glm::dvec3 low(1e300), high(-1e300);
@@ -233,7 +235,7 @@ std::string chunk_name(std::size_t level, std::size_t file) {
     return fmt::format("{}_{}/meta.json", level, file);
 }
 
-/// Writes the level's last file, and begins another.
+/// Writes the level's current file, and begins another.
 void end_file(LodWriter& writer, std::size_t level) {
     if (writer.filling[level].empty()) return;
     const std::string name = chunk_name(level, writer.files[level]++);
@@ -278,7 +280,7 @@ json leaf_of(LodWriter& writer, const LodSplats& splats) {
     return {{"bound", bound_of(writer, splats)}, {"lods", lods}};
 }
 
-/// Halves by the median of the finest level on its widest axis until leaves are small.
+/// Halves at the median of the finest level on its widest axis, until leaves are small.
 json node_of(LodWriter& writer, LodSplats splats) {
     std::vector<std::uint32_t>& finest = splats[0];
     if (finest.size() <= kLeafSplats) return leaf_of(writer, splats);
@@ -308,7 +310,7 @@ json node_of(LodWriter& writer, LodSplats splats) {
     return {{"bound", std::move(bound)}, {"children", {std::move(first), std::move(second)}}};
 }
 
-/// A quarter and a sixteenth.
+/// Levels with a quarter and a sixteenth of the splats.
 std::vector<std::size_t> usual_levels(std::size_t splats) {
     std::vector<std::size_t> counts;
     for (const std::size_t part : {4, 16})

@@ -16,19 +16,21 @@ namespace {
 constexpr std::size_t kSplatsOfDensity = 100'000, kSplatsOfDepth = 20'000, kMostCameras = 64;
 constexpr float kLogitOfTenth = -2.2f;
 constexpr double kTail = 0.02;       // left out at each end
-constexpr double kReach = 2.5;       // of the median distance: what is farther is background
-constexpr int kMostRounds = 20;      // of leaving out, and of weighing
-constexpr int kCells = 16;           // each way, of the middle half of a picture, for depths
+constexpr double kReach = 2.5;       // times the median distance: what is farther is background
+constexpr int kMostRounds = 20;      // rounds in which splats are left out, or axes reweighted
+constexpr int kCells = 16;           // per side, over the middle half of a picture, for depths
 constexpr double kOpaque = 0.7;      // optical depth of half the light
-constexpr double kPrior = 0.03;      // weight of the depth that is seen, of that of the axes
-constexpr double kLeastMiss = 0.02;  // of the usual depth: an axis that passes as near hits
-constexpr double kAhead = 0.1;    // of the depth that is seen: nearer is not in front of a camera
-constexpr double kFarthest = 10;  // of the depth that is seen: farther is not what is looked at
+constexpr double kPrior = 0.03;      // weight of the seen depth, relative to that of the axes
+constexpr double kLeastMiss = 0.02;  // share of the median depth: an axis that passes as near
+                                     // counts as a hit
+constexpr double kAhead = 0.1;       // share of the seen depth: a nearer point is not in front of a
+                                     // camera
+constexpr double kFarthest = 10;  // times the seen depth: a farther point is not what is looked at
 constexpr double kAgree = 0.6;    // share of the cameras that have the point in front of them
 constexpr double kOneWay = 0.5;   // length of the mean of their directions
 
 struct Weighed {
-    glm::dvec3 at;  // from the model's origin
+    glm::dvec3 at;  // relative to the model's origin
     double weight;
 };
 
@@ -69,7 +71,7 @@ std::vector<Weighed> opaque_splats(const SplatModel& m, float least_logit) {
     return splats;
 }
 
-/// How far they are from their median, and the median of that.
+/// The distances from their median, and the median of those.
 double distances_to_median(const std::vector<Weighed>& splats, std::vector<double>& distances) {
     glm::dvec3 middle(0.0);
     std::vector<std::pair<double, double>> values(splats.size());
@@ -86,12 +88,12 @@ double distances_to_median(const std::vector<Weighed>& splats, std::vector<doubl
     return weighted_median(values);
 }
 
-/// What is seen of each cell of the picture's middle: depths, nearest first.
+/// A splat in a cell of the picture's middle.
 struct Seen {
-    double depth, covers;  // optical depth of the cell
+    double depth, covers;  // covers: optical depth that it adds to the cell
 };
 
-/// Depth of the first surface in a cell; nothing where light goes through.
+/// Depth of the first surface in a cell; nothing where light passes through.
 std::optional<double> surface_of(std::vector<Seen>& cell) {
     std::sort(cell.begin(), cell.end(),
               [](const Seen& a, const Seen& b) { return a.depth < b.depth; });
@@ -104,7 +106,7 @@ std::optional<double> surface_of(std::vector<Seen>& cell) {
 /// A camera that sees something.
 struct Looking {
     const Camera* camera;
-    double depth;  // of what it sees
+    double depth;  // median depth of the splats it sees
 };
 
 std::vector<Looking> looking_cameras(const SplatModel& model, std::span<const Camera> cameras) {
@@ -128,7 +130,7 @@ glm::dvec3 median_of(const std::vector<glm::dvec3>& points) {
     return middle;
 }
 
-/// By least squares of the distances to the axes, whose weights fall with them (Cauchy's).
+/// Least squares of the distances to the axes, whose weights fall with distance (Cauchy's weights).
 glm::dvec3 nearest_to_axes(const std::vector<Looking>& looking, const glm::dvec3& seen) {
     glm::dvec3 point = seen;
     std::vector<double> depths, misses(looking.size()), weights(looking.size(), 1.0);
@@ -157,7 +159,7 @@ glm::dvec3 nearest_to_axes(const std::vector<Looking>& looking, const glm::dvec3
     return point;
 }
 
-/// Whether most cameras have it in front of them, where they see something.
+/// Whether most cameras have the point in front of them, at a depth at which they see something.
 bool is_looked_at(const glm::dvec3& point, const std::vector<Looking>& looking) {
     std::size_t ahead = 0;
     for (const Looking& one : looking) {
@@ -167,7 +169,7 @@ bool is_looked_at(const glm::dvec3& point, const std::vector<Looking>& looking) 
     return static_cast<double>(ahead) >= kAgree * static_cast<double>(looking.size());
 }
 
-/// The centre's distance that 98 % of the opaque splats do not exceed.
+/// The distance from the centre that 98 % of the opaque splats do not exceed.
 double reach_of_splats(const SplatModel& model, const glm::dvec3& centre) {
     std::vector<double> distances;
     for (const Weighed& splat : opaque_splats(model, kLogitOfTenth))
@@ -175,7 +177,7 @@ double reach_of_splats(const SplatModel& model, const glm::dvec3& centre) {
     return distances.empty() ? HUGE_VAL : nearest_rank(distances, 1 - kTail);
 }
 
-/// What the frames hold of it.
+/// The radius that the frames show of the subject.
 double radius_of_frames(const Subject& subject, const std::vector<Looking>& looking) {
     std::vector<double> halves, beside;
     for (const Looking& one : looking) {
@@ -241,7 +243,7 @@ std::optional<double> seen_depth(const SplatModel& model, const Camera& camera) 
         const double x = (camera.fx * at.x / at.z + camera.cx - 0.25 * camera.width) / side_x;
         const double y = (camera.fy * at.y / at.z + camera.cy - 0.25 * camera.height) / side_y;
         if (!(x >= 0 && x < kCells && y >= 0 && y < kCells)) continue;
-        // Of an ellipse of one standard deviation, twice: the integral of a Gaussian.
+        // Twice the area of the ellipse at one standard deviation: the integral of a Gaussian.
         const double log_area = double{s[0]} + s[1] + s[2] - std::min({s[0], s[1], s[2]});
         const double area = 2 * std::numbers::pi * std::exp(std::min(log_area, 50.0)) * camera.fx *
                             camera.fy / (at.z * at.z * side_x * side_y);
@@ -252,7 +254,7 @@ std::optional<double> seen_depth(const SplatModel& model, const Camera& camera) 
     std::vector<double> depths;
     for (std::vector<Seen>& cell : cells)
         if (const auto depth = surface_of(cell)) depths.push_back(*depth);
-    if (depths.empty())  // thin everywhere: the middle of what there is
+    if (depths.empty())  // thin everywhere: take the middle of what there is
         for (const std::vector<Seen>& cell : cells)
             for (const Seen& seen : cell) depths.push_back(seen.depth);
     if (depths.empty()) return {};
@@ -317,7 +319,7 @@ struct Standing {
     double weight;
 };
 
-/// Weight of a layer times its width.
+/// The weight of a layer times its width.
 double footing(const std::vector<Standing>& splats, int axis, double from, double to) {
     double weight = 0, square = 0;
     glm::dvec3 sum(0.0);
@@ -334,7 +336,7 @@ double footing(const std::vector<Standing>& splats, int axis, double from, doubl
     return weight * std::sqrt(std::max(variance, 0.0));
 }
 
-/// Of the ends of an axis.
+/// A value for each end of an axis.
 struct Ends {
     double low = 0, high = 0;
 };

@@ -17,12 +17,13 @@ namespace darb {
 namespace {
 
 constexpr size_t kFewPoints = 10;                // too few for a range of depths
-constexpr size_t kLookedAt = 400;                // points of a view
+constexpr size_t kLookedAt = 400;                // points per view
 constexpr double kNearer = 0.7, kFarther = 1.6;  // than the points
 constexpr double kStray = 0.02;         // share of the points at each end that may be wrong
-constexpr double kNearestShare = 0.05;  // of the way to the middle of the region
+constexpr double kNearestShare = 0.05;  // share of the distance to the middle of the region
 constexpr double kGoodAngle = 12, kBelow = 6, kAbove = 12;  // degrees
-constexpr double kLeastShare = 0.05;                        // of what a photo shows, for a source
+constexpr double kLeastShare = 0.05;                        // a source shows at least this share of
+                                                            // what the photo shows
 constexpr std::uint8_t kOpaque = 128;
 
 ImageF grey_of(const ImageU8& rgba) {
@@ -66,7 +67,7 @@ bool is_seen(const Camera& camera, const glm::dvec3& point) {
 
 using Points = std::vector<glm::dvec3>;
 
-// By view: the points that the source says it saw, or else those in its frame.
+// For each view, the points that the source says it saw, or else those in its frame.
 std::vector<Points> points_of_views(const Dataset& dataset) {
     const PointCloud& cloud = dataset.points;
     std::vector<Points> seen(dataset.views.size());
@@ -104,7 +105,7 @@ void set_range_of_region(const Region& region, StereoPhoto& photo) {
     photo.near = std::max(middle - half, kNearestShare * photo.far);
 }
 
-// Places in the frame at depths of the range, where there are no points to say what a photo shows.
+// Places in the frame at depths within the range, for when no points tell what a photo shows.
 Points places_in_frame(const StereoPhoto& photo) {
     constexpr int kSteps = 6, kDepths = 3;
     Points places;
@@ -179,14 +180,14 @@ std::vector<StereoPhoto> stereo_photos(const Dataset& dataset, const std::vector
 namespace {
 
 constexpr int kStarts = 12, kSweeps = 4;
-constexpr float kFirstReach = 0.04f;  // of the random changes; half of it in each further sweep
+constexpr float kFirstReach = 0.04f;  // size of the random changes; halved in each further sweep
 constexpr double kSteepest = 4;       // tangent of the angle between surface and picture, at most
 
 glm::dmat3 intrinsics(const Camera& c) {
     return {c.fx, 0, 0, 0, c.fy, 0, c.cx, c.cy, 1};
 }
 
-// A word a pixel: its grey and those right of it, below it, and both, 1 to 255; 0: no photo.
+// One word per pixel: its grey and those to its right, below, and both, 1 to 255; 0: no photo.
 void add_greys(const ImageF& grey, std::vector<std::uint32_t>& words) {
     const auto byte = [&](int x, int y) -> std::uint32_t {
         if (x >= grey.width || y >= grey.height) return 0;
@@ -199,7 +200,7 @@ void add_greys(const ImageF& grey, std::vector<std::uint32_t>& words) {
                             byte(x + 1, y + 1) << 24);
 }
 
-// Of the photo and of its sources, one after the other.
+// The greys of the photo and of its sources, one after the other.
 std::vector<std::uint32_t> greys_of(const std::vector<StereoPhoto>& photos, std::size_t reference) {
     std::vector<std::uint32_t> words;
     add_greys(photos[reference].grey, words);
@@ -321,7 +322,7 @@ namespace {
 struct Match {
     std::uint32_t photo;
     int x, y;             // the pixel
-    glm::dvec3 position;  // world, of its own depth
+    glm::dvec3 position;  // world, at the pixel's own depth
     glm::dvec3 normal;    // world, towards its camera
 };
 
@@ -341,7 +342,7 @@ class Fusion {
                     beside_[s].push_back(static_cast<std::uint32_t>(r));
     }
 
-    // Pixels of other photos whose depth agrees with that of this one.
+    // Finds pixels of other photos whose depth agrees with that of this one.
     std::vector<Match> matches(std::uint32_t r, int x, int y) const {
         std::vector<Match> found;
         const Plane plane = at(r, x, y);
@@ -370,7 +371,8 @@ class Fusion {
     const std::vector<StereoPhoto>& photos_;
     const std::vector<PlaneMap>& maps_;
     const FusionOptions& options_;
-    std::vector<std::vector<std::uint32_t>> beside_;  // sources, and those that it is one of
+    std::vector<std::vector<std::uint32_t>> beside_;  // its sources, and photos of which it is a
+                                                      // source
 
     Plane at(std::uint32_t photo, int x, int y) const {
         const float* p = &maps_[photo].data[maps_[photo].index(x, y, 0)];
@@ -419,7 +421,7 @@ class Fusion {
     }
 };
 
-// Which pixels of a photo lie within the spacing of a point.
+// Marks the pixels of a photo that lie within the spacing of a point.
 class Taken {
   public:
     explicit Taken(const std::vector<StereoPhoto>& photos) {

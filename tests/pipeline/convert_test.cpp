@@ -1,5 +1,5 @@
-// darb convert and darb info on scenes of every format: what is written, what is said, and pictures
-// of the same object in two formats.
+// Runs darb convert and darb info on scenes in every format: checks what is written, what is
+// printed, and that pictures agree between formats.
 
 #include <sys/stat.h>
 

@@ -34,10 +34,10 @@ struct Left {
     std::size_t atan = 0;             // only lenses need it
     std::size_t length_or_cross = 0;  // the compensation has one more than the factor
     std::size_t shifts = 0;           // to the right by an amount: a photo's alpha is rgba >> 24
-    std::size_t accesses = 0;         // of push constants and buffers
+    std::size_t accesses = 0;         // to push constants and buffers
     bool alpha_mask = false;          // compares with 0x80000000, an alpha of 128
     std::set<int> bindings;
-    std::set<int> camera_members;  // of CameraData, by index
+    std::set<int> camera_members;  // members of CameraData, by index
 };
 
 bool has_tools() {
@@ -190,7 +190,7 @@ TEST_F(PassSpirv, frames_without_huge_splats_know_no_list_of_huge_splats_and_no_
 TEST_F(PassSpirv, kernels_without_shapes_read_and_write_no_exponent) {
     struct Pass {
         const char* shader;
-        std::set<int> bindings;  // of shapes, exponents and their sums
+        std::set<int> bindings;  // those of shapes, exponents and their sums
     };
     for (const Pass& pass :
          {Pass{"project", {7, 16}}, Pass{"blend", {10}}, Pass{"blend_backward", {16, 17}},

@@ -160,8 +160,8 @@ INSTANTIATE_TEST_SUITE_P(own, KernelGradient,
                                           testing::Values(Footprint::psi, Footprint::exact)),
                          name_of);
 
-// Of built-in kernels without rings, the device is compared with double gradients and these with
-// their differences, in tests of their own.
+// For built-in kernels without rings, the device is compared with gradients in double, and these
+// with differences in double, in separate tests.
 class DoubleDifferences : public KernelGradient {};
 
 TEST_P(DoubleDifferences, are_matched) {

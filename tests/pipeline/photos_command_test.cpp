@@ -23,7 +23,7 @@ using test::kScene;
 class PhotosCommand : public testing::Test {
   protected:
     void SetUp() override {
-        fs::remove_all(scratch());  // of the case before
+        fs::remove_all(scratch());  // left by the case before
         for (const char* name : {"view_00.png", "view_01.png", "view_02.png"}) {
             fs::create_directories(photos());
             fs::copy_file(kScene + "/images/" + name, photos() / name,

@@ -252,7 +252,7 @@ TEST_F(RunFolder, the_plan_decides_on_antialiasing_long) {
     EXPECT_TRUE(antialias("--kernel sinc --schedule 3dgs --effects all"));
 }
 
-// Of a quiet run, too.
+// Also in a quiet run.
 TEST_F(RunFolder, splats_that_are_lost_are_said) {
     const Outcome none = train(
         "--iterations 40 -q --no-report --prune-opacity 0.99 --densify-from-iter 1 "

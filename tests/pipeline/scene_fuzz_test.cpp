@@ -101,7 +101,7 @@ size_t not_finite(const std::vector<float>& values) {
     return count;
 }
 
-// Of the kept splats, in order.
+// The rows of the kept splats, in order.
 std::vector<float> rows_of(const std::vector<float>& values,
                            const std::vector<std::uint32_t>& intersections) {
     std::vector<float> rows;

@@ -60,7 +60,7 @@ void expect_gradients_match(const Result& r, const Tolerance& allowed, bool shap
         check(fmt::format("d_colour.{}", c).c_str(), [c](const auto& p) { return p.d_colour[c]; });
 }
 
-/// Of the way that the scene names.
+/// Compares the way of going back that the scene names.
 Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed) {
     const size_t pixels = size_t(scene.width) * scene.height;
     Pcg32 rng(23);

@@ -226,7 +226,7 @@ TEST(Densify, values_that_are_not_finite_do_not_grow) {
 }
 
 /// Offsets of children from their parent, in the parent's frame and in units of its scale. shape:
-/// of all parents, where the kernel has shapes.
+/// that of all parents, where the kernel has shapes.
 std::vector<glm::dvec3> child_offsets(int kernel, size_t parents, std::uint32_t seed,
                                       Footprint footprint = Footprint::psi, float shape = 0) {
     Population population(parents);

@@ -123,7 +123,8 @@ TEST(ExposureGrid, pictures_match_double) {
     EXPECT_TRUE(compare("mapped", expected, run_grid(c).mapped, tolerance("projection_float32")));
 }
 
-// Of colours, beside the kinks where a luminance goes from one cell of the grid to the next.
+// Gradients by the colours, away from the kinks where a luminance passes from one cell of the grid
+// to the next.
 TEST(ExposureGrid, gradients_of_the_picture_match_finite_differences) {
     Case c = random_case();
     const GridRun got = run_grid(c);

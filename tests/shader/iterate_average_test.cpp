@@ -86,7 +86,7 @@ TEST(IterateAverage, begins_anew_with_another_count_and_degree) {
     average.add(GpuSplats(shared_device(), model(50, 2, 1), true));
     average.clear();
     GpuSplats splats(shared_device(), model(0, 3, 1), true);
-    average.swap(splats);  // of nothing
+    average.swap(splats);  // with no splats
     EXPECT_EQ(splats.count(), 0U);
     const SplatModel other = model(70, 3, 2);
     splats = GpuSplats(shared_device(), other, true);

@@ -250,7 +250,7 @@ TEST_F(KernelShader, Weights_of_blends_areThoseOfDouble) {
                 const double allowed = kernel.rounding(m);
                 for (std::size_t i = 0; i < probes.size(); ++i) {
                     const double q = probes[i].q;
-                    bool at_edge = false;  // of either, where a rounding of q decides
+                    bool at_edge = false;  // at either kernel's edge, where a rounding of q decides
                     for (const int k : parts) at_edge |= std::abs(q / kernel_support(k) - 1) < 1e-2;
                     const ShapedValue truth = kernel.value(footprint, m, q);
                     if (!at_edge) {

@@ -51,7 +51,8 @@ Views turning_away(bool antialias) {
     return views;
 }
 
-constexpr double kSeen = 1e-3;  // of a pixel's light: below, float32 and double may disagree
+constexpr double kSeen = 1e-3;  // share of a pixel's light: below it, float32 and double may
+                                // disagree
 
 TEST(LightShare, views_that_see_a_splat_are_those_in_which_the_reference_blends_it) {
     for (const bool antialias : {false, true}) {

@@ -38,7 +38,7 @@ TEST(NearestCentre, device_and_host_find_the_same) {
         clusters.assign(rows, dims, centres, batches, device);
         ASSERT_EQ(device.size(), 333u);
         for (size_t i = 0; i < 333; ++i)
-            if (device[i] != host[i]) {  // of one distance, to rounding
+            if (device[i] != host[i]) {  // at equal distance, up to rounding
                 EXPECT_NEAR(distance(rows, i, centres, device[i], dims),
                             distance(rows, i, centres, host[i], dims), 1e-5)
                     << "dims " << dims << " row " << i;

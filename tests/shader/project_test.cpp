@@ -47,7 +47,7 @@ double worst_q_error(const reference::ProjectedSplat<double>& truth, const glm::
 
 struct Allowed {
     double q = 2e-5;         // relative
-    double position = 2e-6;  // of the mean, relative to its size in px and to the image
+    double position = 2e-6;  // error of the mean, relative to its size in px and to the image
 };
 
 /// Compares all outputs of splats that both see; returns how many.

@@ -15,8 +15,8 @@
 
 namespace darb::test {
 
-/// What blend_backward leaves for one intersection: [0..3] sums of G x, G x x, G x dy, G dy, [4]
-/// d_opacity, [5..7] d_colour, [8] sum of G dy dy.
+/// What blend_backward leaves for one intersection: [0..3] sums of G x, G x x, G x dy, G dy; [4]
+/// d_opacity; [5..7] d_colour; [8] sum of G dy dy.
 using IntersectionPartials = std::array<float, 10>;
 
 /// The intersections of every splat, one after another.
@@ -27,7 +27,8 @@ struct Partials {
     /// 0 to 5 intersections each; every fifth splat has none. The size of the sums differs by 1e4
     /// between splats, as it does in scenes.
     static Partials random(size_t splats, std::uint64_t seed) {
-        Pcg32 rng(seed), exponents(seed, 9);  // of kernels with shapes, apart from the others
+        Pcg32 rng(seed), exponents(seed, 9);  // exponents: for kernels with shapes, drawn from a
+                                              // stream of their own
         Partials p;
         for (size_t i = 0; i < splats; ++i) {
             p.begin.push_back(static_cast<std::uint32_t>(p.intersections.size()));
@@ -72,7 +73,7 @@ inline PassState start_state(const SplatModel& model) {
     return s;
 }
 
-/// The arguments as Backward makes them; weights are not divided by the count.
+/// The arguments as Backward makes them, except that weights are not divided by the count.
 inline gpu::ProjectBackwardArgs backward_args(std::uint32_t splats, const AdamStep& step) {
     gpu::ProjectBackwardArgs args{};
     args.splat_end = splats;
@@ -88,7 +89,8 @@ inline gpu::ProjectBackwardArgs backward_args(std::uint32_t splats, const AdamSt
     return args;
 }
 
-/// One run of the pass; update: UPDATE_*. Without Adam gradient_sum holds what the view shows.
+/// Runs the pass once; update: UPDATE_*. Without Adam, gradient_sum receives what this view
+/// contributes.
 inline PassState run_backward_pass(const SplatModel& model, const Camera& camera, int sh_degree,
                                    int update, const PassState& before, const Partials& partials,
                                    const AdamStep& step = {}, const ProjectionEffects& effects = {},
@@ -183,7 +185,7 @@ inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera
             2 * s.l22 * sum[8],
             sum[4],
             sum[9],
-            0,  // of the depth
+            0,  // gradient by the depth
             {sum[5], sum[6], sum[7]}};
         reference::project_backward(splats, i, camera, settings, kernel, {s, g}, out);
         result.mean_ndc.push_back(

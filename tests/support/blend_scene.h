@@ -26,7 +26,7 @@ struct BlendScene {
     float stop = static_cast<float>(TRANSMITTANCE_STOP);
     glm::vec3 background{0.0f};
     std::uint32_t segment = 0;  // intersections of a list a dispatch; 0: all
-    std::uint32_t threads = 0;  // of a workgroup of blend.comp; 0: a subgroup a block
+    std::uint32_t threads = 0;  // in a workgroup of blend.comp; 0: one subgroup per block
     BackwardBlend back = BackwardBlend::subgroup;
     bool depth_sum = false;  // as ForwardOptions: d_image has five planes
     std::vector<reference::ProjectedSplat<double>> splats;  // nearest first

@@ -1,4 +1,4 @@
-// dL/d(camera) along the ten ways that a camera moves: three turns about its own axes, the
+// dL/d(camera) along the ten ways in which a camera can change: three turns about its own axes, the
 // translation, focal lengths, principal point.
 #pragma once
 
@@ -13,11 +13,11 @@ namespace darb::test {
 
 constexpr int kFreedoms = 10;
 
-/// dL of a move, by the gradient of the camera's numbers.
+/// dL along a move, from the gradient by the camera's numbers.
 inline double along(const CameraGradient& d, const Camera& camera, int which) {
     if (which >= 6) return std::array{d.d_fx, d.d_fy, d.d_cx, d.d_cy}[size_t(which) - 6];
     if (which >= 3) return d.d_translation[which - 3];
-    glm::dmat3 generator(0.0);  // of the rotation about that axis
+    glm::dmat3 generator(0.0);  // generator of the rotation about that axis
     const int j = (which + 1) % 3, k = (which + 2) % 3;
     generator[j][k] = 1;
     generator[k][j] = -1;

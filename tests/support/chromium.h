@@ -1,5 +1,5 @@
-// Opens a page in headless Chromium, where it is installed, and tells what it looks like from
-// inside.
+// Opens a page in headless Chromium, where it is installed, and reports what is found inside the
+// page.
 #pragma once
 
 #include <fmt/format.h>
@@ -23,12 +23,12 @@ inline std::string chromium() {
 struct OpenedPage {
     int plots = 0, drawn = 0;   // SVG elements; those with a visible curve, dot or area
     int pictures = 0;           // elements with a background picture of some size
-    int cut = 0, overlaps = 0;  // texts of plots that reach over the plot's edge; over one another
-    std::string touching;       // the first of these texts
-    std::string console;        // what was written to it; empty: nothing
+    int cut = 0, overlaps = 0;  // texts of plots that reach beyond the plot's edge; that overlap
+    std::string touching;       // the first text that is cut or overlaps
+    std::string console;        // what was written to the console
 };
 
-/// The page gets a script of the test's at its end, which writes what it finds into the title.
+/// A script appended to the page writes what it finds into the title.
 inline OpenedPage open_page(const std::string& html, const std::filesystem::path& folder) {
     constexpr const char* kProbe =
         "<script>const all=[...document.querySelectorAll('svg')];"

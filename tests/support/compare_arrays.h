@@ -17,14 +17,14 @@ namespace darb::test {
 using reference::comparison_stats;
 using reference::ComparisonStats;
 
-/// Fails on different lengths, on nothing to compare, and where the tolerance says so. The message
+/// Fails on different lengths, on empty arrays, and where the tolerance is exceeded. The message
 /// names the first failures with their index as [i / inner][i % inner].
 testing::AssertionResult compare_doubles(std::string_view case_name,
                                          std::span<const double> expected,
                                          std::span<const double> got, const Tolerance& tolerance,
                                          size_t inner);
 
-/// The same for any two containers of numbers.
+/// As above, for any two containers of numbers.
 template <class Expected, class Got>
 testing::AssertionResult compare(std::string_view case_name, const Expected& expected,
                                  const Got& got, const Tolerance& tolerance, size_t inner = 1) {
@@ -33,9 +33,9 @@ testing::AssertionResult compare(std::string_view case_name, const Expected& exp
     return compare_doubles(case_name, a, b, tolerance, inner);
 }
 
-/// The same with the absolute part in units of the root mean square of the expected values: for
-/// sums that cancel, whose rounding goes with their terms. The worst error in that unit goes to the
-/// test's XML record under the name of the case.
+/// As above, with the absolute part in units of the root mean square of the expected values: for
+/// sums that cancel, whose rounding grows with their terms. The worst error in that unit is written
+/// to the test's XML record under the name of the case.
 testing::AssertionResult compare_scaled_doubles(const std::string& case_name,
                                                 std::span<const double> expected,
                                                 std::span<const double> got,

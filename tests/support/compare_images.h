@@ -1,4 +1,4 @@
-// Images against each other, and as the reference has them.
+// Compares images with each other, and with those of the reference.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ inline Image<double> widened(const ImageF& image) {
     return wide;
 }
 
-/// 256 where their sizes differ.
+/// The largest difference of two values; 256 where the sizes differ.
 inline int largest_difference(const ImageU8& a, const ImageU8& b) {
     if (a.width != b.width || a.data.size() != b.data.size()) return 256;
     int largest = 0;

@@ -11,7 +11,7 @@ namespace darb::test {
 constexpr int kSmoothBlend = blend_of(KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE);
 constexpr int kSteepBlend = blend_of(KERNEL_SINC, KERNEL_INVERSE_QUADRATIC);
 
-/// With a blend.
+/// Including a blend.
 inline std::vector<int> every_shaped_kernel() {
     std::vector<int> kernels = shaped_kernels();
     kernels.push_back(kSmoothBlend);

@@ -1,4 +1,4 @@
-// Shell scripts in the place of programs that the command calls, and a PATH that finds them.
+// Shell scripts in place of programs that the command calls, and a PATH on which they are found.
 #pragma once
 
 #include <fmt/format.h>
@@ -17,8 +17,8 @@ inline void write_fake_program(const std::filesystem::path& path, const std::str
     std::filesystem::permissions(path, std::filesystem::perms::owner_all);
 }
 
-/// Notes each command in the file `calls`, the photos that it gets in calls.photos, and answers
-/// with the photos and cameras of the folder `scene`.
+/// A script that notes each command in the file `calls` and the photos that it gets in
+/// calls.photos, and answers with the photos and cameras of the folder `scene`.
 inline void write_fake_colmap(const std::filesystem::path& path, const std::filesystem::path& calls,
                               const std::string& scene) {
     write_fake_program(
@@ -38,7 +38,7 @@ inline void write_fake_colmap(const std::filesystem::path& path, const std::file
                           calls.string(), scene));
 }
 
-/// The command with this PATH.
+/// Runs the command with this PATH.
 inline Outcome with_path(const std::string& path, const std::string& arguments) {
     const std::string before = std::getenv("PATH");
     ::setenv("PATH", path.c_str(), 1);

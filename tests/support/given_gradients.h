@@ -1,5 +1,5 @@
-// What tests of the gradients of a view have in common: a background, the reference's settings for
-// it, and dL/d(image) of no shape.
+// What tests of gradients by a view share: a background, the reference's settings for it, and a
+// random dL/d(image).
 #pragma once
 
 #include "engine/core/image.h"
@@ -12,7 +12,7 @@ namespace darb::test {
 
 inline const glm::vec3 kBackground(0.25f, 0.5f, 0.75f);
 
-/// [H][W][channels], of numbers between -1 and 1.
+/// [H][W][channels], with numbers between -1 and 1.
 inline ImageF random_image(const Camera& camera, int channels, std::uint64_t seed) {
     Pcg32 rng(seed);
     ImageF image(camera.width, camera.height, channels);

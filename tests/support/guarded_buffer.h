@@ -1,5 +1,5 @@
-// GuardedBuffer: device memory between guard words, all of it poison until it is written, so that a
-// test sees what a pass writes outside its bounds and what it leaves alone.
+// GuardedBuffer: device memory between guard words, poisoned until it is written, so that a test
+// sees what a pass writes outside its bounds and what it leaves unwritten.
 #pragma once
 
 #include <fmt/format.h>
@@ -28,7 +28,8 @@ class GuardedBuffer {
         write(values);
     }
 
-    /// To the end of the buffer, guard words and all: an access outside is real, not clamped.
+    /// Reaches to the end of the buffer, guard words included, so that an access outside is a real
+    /// one, not clamped.
     operator BufferRange() const { return {buffer_, kGuardBytes}; }
     const Buffer& buffer() const { return buffer_; }
     static constexpr std::uint64_t offset() { return kGuardBytes; }

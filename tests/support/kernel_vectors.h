@@ -17,11 +17,12 @@ namespace darb::test {
 
 struct KernelVector {
     int kernel = 0;
-    int index = 0;  // in the file, of its kernel
+    int index = 0;  // place among its kernel's vectors in the file
     std::string tag;
     double a = 0, b = 0, c = 0, dx = 0, dy = 0;  // q = a dx^2 + 2 b dx dy + c dy^2; floats
     double opacity = 0, q = 0, w = 0, slope = 0, alpha = 0;
-    double d_dx = 0, d_dy = 0, d_a = 0, d_b = 0, d_c = 0, d_opacity = 0;  // of opacity * w
+    double d_dx = 0, d_dy = 0, d_a = 0, d_b = 0, d_c = 0,
+           d_opacity = 0;  // derivatives of opacity * w
 };
 
 inline std::filesystem::path kernel_vectors_path() {

@@ -1,5 +1,5 @@
-// A small .ksplat file, put together by hand: two sections, the first of two splats in a full
-// bucket of one and one that is not full, the second of one splat.
+// A small .ksplat file, built by hand: two sections, the first with two splats (one full bucket of
+// one splat, and one that is not full), the second with one splat.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ inline float ksplat_harmonic(std::size_t splat, std::size_t c) {
     return static_cast<float>(static_cast<int>((7 * c + 5 * splat) % 23) - 11) / 8;
 }
 
-/// Of values that it holds exactly, or nearly.
+/// For values that a half holds exactly, or nearly.
 inline std::uint16_t ksplat_half(float value) {
     if (value == 0) return 0;
     int exponent = 0;

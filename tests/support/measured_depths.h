@@ -1,4 +1,4 @@
-// Depth files of the views of a tiny training: what its true splats have.
+// Depth files for the views of a tiny training, made from its true splats.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,8 +11,8 @@
 
 namespace darb::test {
 
-/// Gives all views but `without` the depths of `truth`, a unit being a metre, where these splats
-/// cover at least half of a pixel.
+/// Gives every view but `without` the depths of `truth`, with a unit of one metre, where these
+/// splats cover at least half of a pixel.
 inline void add_measured_depths(const SplatModel& truth, TinyTraining& t, int without = -1) {
     const auto folder =
         std::filesystem::temp_directory_path() / fmt::format("darb_depths_{}", ::getpid());

@@ -1,5 +1,5 @@
-// Two kernels of one's own: one whose polynomial meets the formula to float rounding, and one that
-// its nearest polynomial stands for, with terms that cancel and a jump at the edge.
+// Two user-defined kernels: one whose polynomial meets the formula to float rounding, and one that
+// is replaced by its nearest polynomial, with terms that cancel and a jump at the edge.
 #pragma once
 
 #include <cmath>

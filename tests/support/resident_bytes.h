@@ -1,4 +1,4 @@
-// What a process holds in memory, as Linux says.
+// The memory that a process holds, as Linux reports it.
 #pragma once
 
 #include <unistd.h>

@@ -1,4 +1,4 @@
-// Trainers that run to an iteration, and runs that stop there and go on from a file.
+// Trainers that run to an iteration, and runs that stop there and resume from a file.
 #pragma once
 
 #include <filesystem>
@@ -17,7 +17,7 @@ inline void run_and_drain(Trainer& trainer, int iteration) {
     trainer.drain();
 }
 
-/// `whole`, where it is, and runs that stop before and go on from the file.
+/// Compares `whole`, as far as it has run, with runs that stop earlier and resume from a file.
 inline void expect_resumes(const TinyTraining& t, Trainer& whole, const std::vector<int>& stops) {
     for (const int stop : stops) {
         SCOPED_TRACE(fmt::format("stopped at {}", stop));

@@ -38,7 +38,7 @@ inline std::string scratch_file(const std::string& name) {
     return scratch() / name;
 }
 
-/// What darb remembers between commands is not the user's here.
+/// Keeps darb from reading or writing the user's own state.
 inline const int kOwnState = ::setenv("XDG_STATE_HOME", scratch_file("state").c_str(), 1);
 
 class RemoveScratch : public testing::Environment {

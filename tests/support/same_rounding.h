@@ -1,6 +1,6 @@
-// Two shaders that compute the same by the same formulas have the same bits where the driver rounds
-// every operation. Drivers of GPUs fuse a * b + c as they see fit, in each shader on its own, as
-// Vulkan lets them.
+// Two shaders that compute the same thing by the same formulas give equal bits where the driver
+// rounds every operation. Drivers of GPUs may fuse a * b + c, in each shader on its own, as Vulkan
+// allows.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,8 +18,8 @@ inline bool rounds_every_operation() {
     return shared_device().info().type == "cpu";
 }
 
-/// Of the same bits on a device that rounds every operation, else within `share` of the largest of
-/// them.
+/// Passes where the bits are equal on a device that rounds every operation, and elsewhere where the
+/// values differ by at most `share` of the largest.
 inline testing::AssertionResult same_but_for_fusing(std::span<const float> a,
                                                     std::span<const float> b, double share) {
     if (a.size() != b.size())

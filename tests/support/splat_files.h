@@ -1,4 +1,4 @@
-// Helpers of the tests of splat files: scenes whose values every format can hold, the error a
+// Helpers for the tests of splat files: scenes whose values every format can hold, the error that a
 // reader throws, and hostile variants of a file.
 #pragma once
 
@@ -32,7 +32,7 @@ inline SplatModel sample_model(int degree, size_t count, std::uint64_t seed = 1)
         .model;
 }
 
-/// "no error" where there is none.
+/// The message of the Error; "no error" where there is none.
 inline std::string error_of(const std::function<void()>& action) {
     try {
         action();
@@ -64,7 +64,7 @@ void set_value(T value, size_t at, FileBytes& file) {
     std::copy(bytes.begin(), bytes.end(), file.begin() + static_cast<std::ptrdiff_t>(at));
 }
 
-/// Every part from the beginning is an Error that names the file.
+/// Checks that every proper prefix of the file gives an Error that names the file.
 inline void expect_truncation_is_refused(const FileBytes& file, const Reader& read,
                                          size_t step = 1) {
     for (size_t length = 0; length < file.size(); length += step) {
@@ -76,7 +76,7 @@ inline void expect_truncation_is_refused(const FileBytes& file, const Reader& re
     }
 }
 
-/// Changed bytes give a model or an Error, whatever they are.
+/// Checks that changed bytes give a model or an Error, whatever they are.
 inline void expect_damage_is_survived(const FileBytes& file, const Reader& read, int rounds) {
     Pcg32 rng(3);
     for (int round = 0; round < rounds; ++round) {
@@ -96,7 +96,7 @@ inline double opacity_of(float logit) {
     return 1 / (1 + std::exp(-double{logit}));
 }
 
-/// |p . q| of the quaternions of splat i and j at unit length: 1 where they are one rotation.
+/// |p . q| of the unit quaternions of splats i and j: 1 where they are the same rotation.
 inline double same_rotation(const SplatModel& a, size_t i, const SplatModel& b, size_t j) {
     const float *p = &a.rotation[4 * i], *q = &b.rotation[4 * j];
     return std::abs(glm::dot(glm::normalize(glm::dquat(p[0], p[1], p[2], p[3])),

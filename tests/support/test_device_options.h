@@ -1,4 +1,4 @@
-// The device of tests: that of the command, so both compile a shader once.
+// Options for the device of tests: those of the command, so that both compile a shader only once.
 #pragma once
 
 #include "tools/darb/device_options.h"

@@ -26,7 +26,7 @@ struct TinyTraining {
 struct TinyOptions {
     int views = 6, width = 64, height = 48;
     size_t splats = 60;
-    double close_up = 1;  // focal length of the third view, over that of the others
+    double close_up = 1;  // focal length of the third view, as a multiple of that of the others
 };
 
 inline ImageU8 with_alpha(const ImageU8& rgb) {

@@ -1,5 +1,4 @@
-// Cameras on a ring around points, which say where each photo saw them; and the same cameras
-// disturbed.
+// Cameras on a ring around points with tracks; and the same cameras disturbed.
 #pragma once
 
 #include <cmath>
@@ -61,7 +60,7 @@ inline std::vector<glm::dvec3> places_of(const Dataset& dataset) {
     return places;
 }
 
-/// px: root of the mean square, of what lies between the pixels of the places.
+/// Root mean square distance between the pixels at which two cameras see the places, px.
 inline double shift_px(const Camera& a, const Camera& b, const std::vector<glm::dvec3>& places) {
     double sum = 0, count = 0;
     for (const glm::dvec3& x : places) {
@@ -73,8 +72,8 @@ inline double shift_px(const Camera& a, const Camera& b, const std::vector<glm::
     return std::sqrt(sum / count);
 }
 
-/// Cameras shifted by about so many px each, turned and moved at random, but not all alike: the
-/// scene as a whole stays.
+/// Shifts cameras by about `px` each, turning and moving them at random but not in common, so that
+/// the scene as a whole stays.
 inline void disturb(std::vector<View>& views, const std::vector<glm::dvec3>& places, double px,
                     std::uint64_t seed = 1) {
     Pcg32 rng(seed);

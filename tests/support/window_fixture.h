@@ -1,5 +1,5 @@
-// A virtual display (Xvfb) with a program of this project on it: mouse, keys and drops go to it as
-// those of a user; what it shows is read from Xvfb's frame buffer file.
+// A virtual display (Xvfb) with a program of this project on it. Mouse, keys and drops reach it as
+// a user's would; what it shows is read from Xvfb's frame buffer file.
 #pragma once
 
 #include <fcntl.h>
@@ -41,7 +41,7 @@ inline bool on_path(const std::string& program) {
     return false;
 }
 
-// A child process; `out` is its standard output where that is read.
+// A child process; `out` is its standard output, where that is read.
 class Process {
   public:
     Process(const Words& words, const std::filesystem::path& log) {
@@ -156,7 +156,7 @@ class DisplayTest : public ::testing::Test {
         return image;
     }
     ImageU8 screen() const { return screen(kDisplayWidth, kDisplayHeight); }
-    // The display once it has been the same for some looks in a row.
+    // The display once it has stayed unchanged for several looks in a row.
     ImageU8 settled() {
         ImageU8 last = screen();
         int same = 0;

@@ -18,7 +18,7 @@ struct CloseXDisplay {
 };
 using XDisplay = std::unique_ptr<Display, CloseXDisplay>;
 
-/// As a desktop sets it, before programs start: the resource Xft.dpi.
+/// Sets the resource Xft.dpi, as a desktop does before programs start.
 inline void set_display_dpi(int dpi) {
     const XDisplay display(XOpenDisplay(nullptr));
     if (!display) return;
@@ -48,7 +48,7 @@ inline Window window_by_name(Display* display, Window below, const std::string& 
     return found;
 }
 
-/// The path as a URI: what is no letter, digit or one of -._~/ as %XX.
+/// The path as a URI: everything but letters, digits and -._~/ as %XX.
 inline std::string file_uri(const std::filesystem::path& file) {
     std::string uri = "file://";
     for (const char c : file.string()) {
@@ -65,8 +65,8 @@ inline std::string file_uri(const std::filesystem::path& file) {
     return uri;
 }
 
-/// Drops the file on the first window whose name contains `name`; false where there is none, or
-/// where it has not taken the file within a minute.
+/// Drops the file on the first window whose name contains `name`. Returns false where there is
+/// none, or where it has not taken the file within a minute.
 inline bool drop_on_window(const std::string& name, const std::filesystem::path& file) {
     const XDisplay opened(XOpenDisplay(nullptr));
     Display* d = opened.get();

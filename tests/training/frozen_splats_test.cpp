@@ -20,7 +20,8 @@ Trainer frozen_trainer(const TinyTraining& t, std::uint32_t frozen) {
     return Trainer(shared_device(), t.dataset, t.photos, t.start(), t.options, {}, frozen);
 }
 
-// Of the values of the first splats; harmonics as wide as those of the start.
+// Compares the values of the first splats; harmonics are compared up to the width of the starting
+// ones.
 bool begins_alike(const SplatModel& a, const SplatModel& b, std::uint32_t splats) {
     for (int at = 0; at < kAttributeCount; ++at) {
         const std::vector<float>& one = attribute_values(a, at);

@@ -34,7 +34,7 @@ TinyTraining growing(const TinyOptions& tiny) {
     return t;
 }
 
-/// Of `t`: half of what an unlimited run adds after its first round.
+/// Half of what an unlimited run of `t` adds after its first round.
 std::uint64_t half_of_the_growth(const TinyTraining& t, std::uint32_t& unlimited) {
     Trainer trainer = t.trainer();
     run_to(trainer, 15);

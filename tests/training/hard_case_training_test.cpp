@@ -63,7 +63,7 @@ Training training_of(const check::HardCase& c) {
 }
 
 struct Result {
-    std::vector<double> loss;  // of each step
+    std::vector<double> loss;  // loss of each step
     std::uint32_t splats = 0;
     std::uint64_t bad_gradients = 0;
     bool finite = true;

@@ -84,7 +84,7 @@ TEST(InitialModel, a_cap_draws_from_the_whole_cloud) {
         high = std::max(high, double(model.position[3 * i]));
         places.insert(model.position[3 * i]);
     }
-    EXPECT_LT(low, 10);  // of 0 to 99.9
+    EXPECT_LT(low, 10);  // the range is 0 to 99.9
     EXPECT_GT(high, 90);
     EXPECT_EQ(places.size(), 100U) << "a point was drawn twice";
     // Distances are those of what was drawn: ten times as far apart as all.

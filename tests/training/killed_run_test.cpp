@@ -99,7 +99,7 @@ TEST_F(KilledRun, resumes_to_the_bytes_of_a_run_that_nobody_killed) {
     for (int round = 0; round < 5; ++round) {
         std::vector<std::string> arguments = training(killed);
         if (round > 0) arguments.push_back("--resume");
-        fs::remove(temporary);  // of a run that was killed while it wrote
+        fs::remove(temporary);  // left by a run that was killed while writing
         Command command(arguments, log());
         // In even rounds at the next checkpoint, some way into what follows; in odd ones while it
         // is written.

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::uint64_t kLeast = std::uint64_t{1} << 27;
 constexpr std::uint64_t kMost =
-    std::numeric_limits<std::uint32_t>::max();  // of maxStorageBufferRange
+    std::numeric_limits<std::uint32_t>::max();  // the most that maxStorageBufferRange can say
 constexpr std::uint64_t kTebibyte = std::uint64_t{1} << 40;
 
 struct Sized {

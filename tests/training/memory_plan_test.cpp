@@ -22,7 +22,8 @@
 namespace darb {
 namespace {
 
-// Of the peak of a run: what is there for a moment and not planned for, as a picture's one camera.
+// Share of a run's peak that may exist for a moment without being planned for, such as one
+// picture's camera.
 constexpr double kTolerance = 0.01;
 
 Dataset shipped_scene(int resolution = 2) {

@@ -59,7 +59,8 @@ void expect_batches_resume(Strategy strategy) {
     EXPECT_EQ(whole.iteration(), 28);
     ASSERT_EQ(results.size(), 28U);
     for (int i = 0; i < 28; ++i) EXPECT_EQ(results[static_cast<size_t>(i)], i + 1);
-    // Of iteration 6 with the batch up to 8, of 12, of 18 and 24 with that up to 24.
+    // The round of iteration 6 takes place with the batch that ends at 8, that of 12 with its own
+    // batch, those of 18 and 24 with the batch that ends at 24.
     EXPECT_EQ(rounds, (std::vector<int>{8, 16, 24}));
     EXPECT_NE(whole.splat_count(), start) << "growth must take part";
     expect_resumes(t, whole, {16});

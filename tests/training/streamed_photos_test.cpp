@@ -83,8 +83,8 @@ TEST(StreamedPhotos, a_loss_of_the_callers_sees_them_long) {
     }
 }
 
-// Of a budget that holds all but the photos. A device with memory of its own asks what the run
-// comes to: see below.
+// The budget holds everything but the photos. A device with its own memory asks how much the run
+// needs in all: see below.
 TEST(StreamedPhotos, stream_where_a_budget_does_not_hold_them) {
     if (!shared_device().info().unified_memory) GTEST_SKIP() << "the device shares no memory";
     TinyTraining t = tiny_training({.views = 20});

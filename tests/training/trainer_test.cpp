@@ -198,7 +198,7 @@ TEST(Training, gradients_that_are_not_finite_are_counted_over_the_whole_run) {
     Trainer trainer = t.trainer();
     Trainer::State state = trainer.state();
     for (size_t c = 0; c < 3; ++c) state.model.sh_dc[c] = 1e25f;
-    state.counters.bad_gradients = 1000;  // of the run until then
+    state.counters.bad_gradients = 1000;  // from the run so far
     trainer.restore(state);
     EXPECT_THROW(run_to(trainer, 8), Error);
     EXPECT_GT(trainer.counters().bad_gradients, 1000U);
@@ -475,7 +475,7 @@ TEST(Training, every_kernel_brings_the_loss_down_long) {
         trainer.on_result = [&](const IterationResult& r) { losses.push_back(r.loss); };
         run_to(trainer, 60);
         trainer.drain();
-        double first = 0, last = 0;  // of two epochs of five views
+        double first = 0, last = 0;  // sums over two epochs of five views
         for (int i = 0; i < 10; ++i) first += losses[i], last += losses[50 + i];
         EXPECT_LT(last, 0.9 * first);
         EXPECT_EQ(trainer.counters().bad_gradients, 0U);

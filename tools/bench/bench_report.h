@@ -1,6 +1,6 @@
 // Results of `darb bench` as lines on a terminal and as JSON, both in the manner of Google
-// Benchmark: its scripts read the JSON. The library itself is not used: it keeps means where
-// quartiles of every pass are wanted, and numbers alone where passes and yardsticks have a
+// Benchmark, whose scripts can read the JSON. That library is not used: it keeps means where
+// quartiles of every pass are wanted, and plain numbers where passes and yardsticks have a
 // structure.
 #pragma once
 
@@ -12,13 +12,13 @@
 
 namespace darb {
 
-/// What a file says before its results: machine_json(), the device and its rates.
+/// The head of a results file: machine_json(), the device and its rates.
 nlohmann::json context_json(const Device& device, const DeviceRates& rates,
                             const std::string& note);
-/// The same in lines, with the heading of the table.
+/// The head as lines, with the heading of the table.
 std::string context_text(const nlohmann::json& context);
 
-/// details: a line a pass and a yardstick below the case's own.
+/// details: below the case's line, add one line per pass and yardstick.
 std::string result_text(const BenchResult& result, const DeviceRates& rates, bool details);
 nlohmann::json result_json(const BenchResult& result, const DeviceRates& rates);
 

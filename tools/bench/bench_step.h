@@ -1,5 +1,5 @@
-// One step of training on a random scene and a photo of noise, in both ways: Adam within the
-// backward pass, or gradients in buffers and a pass of its own. Each has splats of its own.
+// One training step on a random scene and a photo of noise, in two ways: with Adam inside the
+// backward pass, or with gradients in buffers and a pass of its own. Each way has its own splats.
 #pragma once
 
 #include <cstdio>
@@ -22,10 +22,10 @@ class BenchStep {
   public:
     BenchStep(Device& device, const SplatModel& model, const Camera& camera);
 
-    /// The passes of one step.
+    /// Runs one step and returns its passes.
     std::vector<PassTime> run(bool apart);
     const gpu::FrameStatus& status() const { return status_; }
-    /// Of the last step.
+    /// The passes of the last step.
     const std::vector<RecordedPass>& recorded() const { return commands_.recorded(); }
 
   private:
@@ -45,31 +45,32 @@ class BenchStep {
     gpu::FrameStatus status_{};
 };
 
-// Every pass of pictures and of training, compiled as a device would run it, and what an iteration
-// of training records. Nothing is executed, so that drivers which cannot do it serve as well.
+// Compiles every pass of pictures and of training as a device would run it, and lists what a
+// training iteration records. Nothing is executed, so that drivers without a device serve as well.
 
 struct RecordedWork {
     RecordedPass pass;
-    double bytes = 0;  // that it must move at least once (engine/plan/roofline.h); 0: not known
+    double bytes = 0;  // the least that it must move (engine/plan/roofline.h); 0: not known
 };
 
 struct PassStatistics {
     DeviceInfo device;
-    bool has_statistics = false;             // of the driver; without: times of compilation alone
-    std::vector<CompiledPipeline> compiled;  // each once, by shader and constants
-    /// An iteration of `splats` visible splats of degree 3 in a picture of this size with six
-    /// intersections a splat, the Adam step within the backward pass.
+    bool has_statistics = false;             // from the driver; otherwise there are only times of
+                                             // compilation
+    std::vector<CompiledPipeline> compiled;  // one per shader and set of constants
+    /// An iteration with `splats` visible splats of degree 3, in a picture of this size with six
+    /// intersections per splat, and the Adam step inside the backward pass.
     std::vector<RecordedWork> iteration;
     double splats = 0, pixels = 0, intersections = 0;
 };
 
-/// All choices that the device has of a pass (engine/plan/tuning_names.h), the usual ones first.
-/// Throws Error as Device does.
+/// Compiles every choice that the device has for each pass (engine/plan/tuning_names.h), the usual
+/// ones first. Throws Error as Device does.
 PassStatistics compile_every_pass(const std::string& select);
 
-/// For people, a row each.
+/// Prints a table, one row per pipeline.
 void print_pass_statistics(std::FILE* out, const PassStatistics& statistics);
-/// Everything that the driver says, and the common quantities of it.
+/// Everything that the driver reports, and the quantities common to drivers.
 nlohmann::json pass_statistics_json(const PassStatistics& statistics);
 
 }  // namespace darb

@@ -1,14 +1,14 @@
 #include "tools/bench/cases.h"
 
-#include <algorithm>
-#include <chrono>
-#include <cstring>
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <glm/glm.hpp>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <glm/glm.hpp>
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
@@ -35,8 +35,8 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kOwnViews = 2;   // of the data set, that pictures are timed at
-constexpr int kOwnIterations = 7'000;  // of the run that a step is taken from
+constexpr std::size_t kOwnViews = 2;   // views of the data set at which pictures are timed
+constexpr int kOwnIterations = 7'000;  // length of the run from which a step is taken
 constexpr std::size_t kStepsASample = 10;
 
 BenchResult measure_own_steps(Device& device, const SplatModel& model, Dataset dataset,
@@ -45,7 +45,7 @@ BenchResult measure_own_steps(Device& device, const SplatModel& model, Dataset d
     TrainOptions train;
     train.iterations = kOwnIterations;
     train.resolution_ramp = false;  // steps of whole photos
-    train.densify_until = 0;        // of the scene as it is
+    train.densify_until = 0;        // keep the scene as it is
     train.probe_sh = false;
     train.sh_degree = model.sh_degree;
     train.sh_interval = 1;  // all bands are in use after a few steps

@@ -1,4 +1,4 @@
-// The cases of `darb bench`, each by name and by what it needs.
+// The cases of `darb bench`, with their names and what they need.
 #pragma once
 
 #include <filesystem>
@@ -17,11 +17,12 @@ namespace darb {
 
 struct BenchOptions {
     Sampling sampling;
-    bool full = false;                          // the long set-up: fox_800 after 7,000 iterations
+    bool full = false;                          // long form: fox_800 after 7,000 iterations
     std::optional<std::filesystem::path> data;  // bench_data_folder()
-    std::string device;                         // what --device said, for processes started
-    std::filesystem::path program;              // the darb command itself, likewise
-    /// What darb train does to a data set and its options before it starts.
+    std::string device;                         // the value of --device, for processes that are
+                                                // started
+    std::filesystem::path program;              // the darb command, for the same purpose
+    /// Applies to a data set and its options what darb train does before it starts.
     std::function<void(Dataset&, const std::vector<ImageU8>&, TrainOptions&)> plan_training;
     std::function<void(const std::string&)> progress;
 };
@@ -40,26 +41,26 @@ std::vector<BenchCase> train_cases(bool full);
 std::vector<BenchCase> step_cases();
 /// Radix sort and scan.
 std::vector<BenchCase> sort_cases();
-/// The choices of the passes that have several (engine/plan/tuning_names.h), a row each.
+/// One row for each choice of the passes that have several (engine/plan/tuning_names.h).
 std::vector<BenchCase> tuning_cases();
-/// The first picture of a new process, shaders compiled or from the driver's cache.
+/// The first picture of a new process, with shaders compiled or from the driver's cache.
 std::vector<BenchCase> start_cases();
 
 /// All of them, in this order.
 std::vector<BenchCase> bench_cases(bool full);
 
-/// Of one's own scene: frames of two sizes, or of the data set's cameras; with a data set also
-/// steps of training that go on from the scene.
+/// Cases on the user's own scene: frames in two sizes, or of the data set's cameras; with a data
+/// set, also training steps that continue from the scene.
 std::vector<BenchCase> own_cases(const std::filesystem::path& scene,
                                  const std::filesystem::path& dataset);
 
-/// A frame with the blend's figures, as the cases of render_cases() have it.
+/// Measures a frame, with figures on blending, as the cases of render_cases() do.
 BenchResult measure_picture(Device& device, const SplatModel& model, const Camera& camera,
                             const DeviceRates& rates, const BenchOptions& options);
 /// Frame times of a model at one camera, as `darb render` draws it, without blend figures.
 BenchResult measure_frames(Device& device, const SplatModel& model, const Camera& camera,
                            const DeviceRates& rates, const Sampling& sampling);
-/// Steps of a trainer that was set up; without blend figures.
+/// Measures steps of a trainer that has been set up; without figures on blending.
 class Trainer;
 BenchResult measure_steps(Trainer& trainer, int steps_a_sample, const Sampling& sampling);
 

@@ -1,8 +1,8 @@
 #include "tools/bench/growth.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <tuple>
 
@@ -121,7 +121,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Of the curve on which the splats, and with them the intersections, vary.
+// The points of the curve along which the number of splats, and so that of intersections, varies.
 std::vector<GrowthPoint> points_by_splats(const std::vector<GrowthCurve>& curves,
                                           const std::string& name) {
     std::vector<GrowthPoint> points;

@@ -25,23 +25,24 @@ struct GrowthCurve {
 
 struct GrowthPlan {
     std::uint32_t most_splats = 1'000'000;
-    int most_width = 2560;  // px, of pictures of 16 to 9
+    int most_width = 2560;  // largest width, px, of pictures with aspect 16:9
     Sampling sampling;
 };
 
-/// Sizes that the device or its memory cannot take are left out with a line to progress.
+/// Sizes that the device or its memory cannot take are left out, with a line to progress.
 std::vector<GrowthCurve> measure_growth(Device& device, const GrowthPlan& plan,
                                         const std::function<void(const std::string&)>& progress);
 
-/// The value of a point that a name stands for: splats, pixels or intersections.
+/// The value of a point by its name: splats, pixels or intersections.
 double growth_value(const GrowthPoint& point, const std::string& by);
-/// b of ms = a x^b, least squares of the logarithms over the points whose x is at least a tenth of
-/// the largest: below that fixed costs rule. NaN with fewer than two such points.
+/// The exponent b of ms = a x^b, by least squares of the logarithms over the points whose x is at
+/// least a tenth of the largest; below that, fixed costs dominate. NaN with fewer than two such
+/// points.
 double growth_exponent(const std::vector<GrowthPoint>& points, const std::string& by);
 
 std::string growth_table(const std::vector<GrowthCurve>& curves);
 nlohmann::json growth_json(const std::vector<GrowthCurve>& curves);
-/// A whole page without outside resources. context: context_json().
+/// A whole page without external resources. context: context_json().
 std::string growth_html(const std::vector<GrowthCurve>& curves, const nlohmann::json& context);
 
 }  // namespace darb

@@ -25,7 +25,7 @@ double seconds_of(clockid_t clock) {
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-// Of this process and of the children that it has waited for.
+// Processor time of this process and the children that it has waited for, s.
 double own_seconds() {
     rusage children{};
     getrusage(RUSAGE_CHILDREN, &children);

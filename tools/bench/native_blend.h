@@ -1,5 +1,5 @@
 // Forward and backward blending as plain C++ loops over vectors of floats, on as many threads as
-// the machine has cores: the yardstick of `darb bench` for what the blend passes could take on a
+// the machine has cores: the yardstick of `darb bench` for what the blend passes could achieve on a
 // CPU. They walk the same tile lists, evaluate the same splat-pixels and give the same results as
 // shaders/forward/blend.comp and shaders/backward/blend_backward.comp.
 #pragma once
@@ -15,7 +15,7 @@
 
 namespace darb {
 
-/// What the blend passes of one frame read, on the host. Gaussian splats in float32.
+/// What the blend passes of one frame read, copied to the host. Gaussian splats in float32.
 struct BlendFrame {
     std::uint32_t width = 0, height = 0;     // px
     std::uint32_t tiles_x = 0, tiles_y = 0;  // tiles
@@ -25,13 +25,13 @@ struct BlendFrame {
     std::vector<std::uint32_t> splat_from_intersection;  // [K] by slot, with block bits
     std::vector<glm::vec4> shape, light, bound;          // [N] as project.comp leaves them
     glm::vec3 background{0.0f};
-    std::array<float, 6> polynomial{};  // of 2^f, rising powers
+    std::array<float, 6> polynomial{};  // coefficients for 2^f, rising powers
     float alpha_cutoff = 0;
     float least_transmittance = 0;  // the stop less its slack
 };
 
-/// Of the frame that was recorded last; the queue must be idle. Throws Error where it is of another
-/// kernel, evaluation or storage than the loops know.
+/// Reads back the frame that was recorded last; the queue must be idle. Throws Error where it uses
+/// another kernel, evaluation or storage than the loops support.
 BlendFrame download_frame(const ForwardOptions& options, const Frame& frame, const FrameView& view,
                           std::uint32_t splats, std::uint32_t intersections);
 
@@ -44,11 +44,12 @@ struct BlendedImage {
 };
 
 struct BlendCounts {
-    std::uint64_t evaluated = 0;     // splat-pixels whose kernel is evaluated, 64 a block of 8 x 8
-    std::uint64_t contributing = 0;  // of these, the ones that change a pixel
+    std::uint64_t evaluated = 0;     // splat-pixels whose kernel is evaluated, 64 per block of 8 x
+                                     // 8
+    std::uint64_t contributing = 0;  // those among them that change a pixel
 };
 
-/// Partial sums of an intersection, in its slot, as blend_backward.comp writes them.
+/// Partial sums per intersection, in its slot, as blend_backward.comp writes them.
 struct BlendPartials {
     std::vector<float> first;  // [K][8]
     std::vector<float> rest;   // [K]
@@ -57,13 +58,13 @@ struct BlendPartials {
 /// The instructions that the loops use on this machine: "AVX-512", "AVX2" or "baseline".
 std::string native_instructions();
 
-/// threads: 0 = all cores. Vectors of the results are sized at the first call and used again.
+/// threads: 0 = all cores. The vectors in the results are sized at the first call and reused.
 void native_blend(const BlendFrame& frame, BlendedImage& result, int threads = 0);
 /// d_image: [3][H][W].
 void native_blend_backward(const BlendFrame& frame, const BlendedImage& image,
                            const std::vector<float>& d_image, BlendPartials& result,
                            int threads = 0);
-/// Not timed: slower than native_blend.
+/// Counts; slower than native_blend, and not timed.
 BlendCounts count_blend(const BlendFrame& frame);
 
 }  // namespace darb

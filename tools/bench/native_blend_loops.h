@@ -1,7 +1,8 @@
-// The loops of native_blend.cpp for one tile. Included once for each instruction set, within its
-// own namespace and under its own target: vectors that a set does not have would be taken apart for
-// good where they are first met. DARB_LANES: floats of a vector, 8 or 16. Vectors go by reference:
-// by value their calling convention would depend on the set. No include guard, for that reason.
+// The loops of native_blend.cpp for one tile. Included once for each instruction set, in its own
+// namespace and for its own target, because a compiler splits vectors that a set does not have for
+// good where it first meets them. DARB_LANES: floats in a vector, 8 or 16. Vectors are passed by
+// reference, as by value their calling convention would depend on the set. There is no include
+// guard, for that reason.
 
 constexpr int W = DARB_LANES;
 typedef float F __attribute__((vector_size(4 * DARB_LANES)));
@@ -14,7 +15,7 @@ constexpr F kX = {0, 1, 2, 3, 4, 5, 6, 7}, kY = {};
 constexpr F kX = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
 constexpr F kY = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
 #endif
-constexpr int V = kBlockPixels / W;  // vectors of a block
+constexpr int V = kBlockPixels / W;  // vectors per block
 
 inline std::size_t collect(const BlendFrame& f, std::uint32_t begin, std::uint32_t end,
                            std::uint32_t block, Hits& hits) {
@@ -52,7 +53,7 @@ struct Offset {  // mean - pixel centre, and the whitened offset
     F dy, x, y;
 };
 
-/// dx0, dy0: mean less the centre of the block's first pixel.
+/// dx0, dy0: mean minus the centre of the block's first pixel.
 inline void offset_of(int v, float dx0, float dy0, const glm::vec4& shape, float l22, Offset& o) {
     const F dx = dx0 - kX;
     o.dy = (dy0 - static_cast<float>(v * W / kBlockSide)) - kY;
@@ -60,7 +61,7 @@ inline void offset_of(int v, float dx0, float dy0, const glm::vec4& shape, float
     o.y = l22 * o.dy;
 }
 
-/// What a block's pixels have come to, [V] each.
+/// The running values of a block's pixels, [V] each.
 struct BlockLight {
     const F *red, *green, *blue, *transmittance;  // negative where a pixel has ended
     const I* last;
@@ -196,7 +197,7 @@ inline std::uint32_t load_pixels(const BlendFrame& f, const BlendedImage& image,
     return last;
 }
 
-/// Of one splat: nine sums over the block's pixels, the ninth apart.
+/// Adds one splat: nine sums over the block's pixels, the ninth kept apart.
 inline void backward_splat(const BlendFrame& f, std::uint32_t splat, std::uint32_t number,
                            const Block& at, BackwardPixels& px, float* first, float* rest) {
     const glm::vec4 shape = f.shape[splat], light = f.light[splat];
@@ -272,7 +273,7 @@ inline void forward_tile(const Work& work, std::uint32_t tile, Hits& hits) {
         forward_block<false>(work.frame, tile, block, hits, *work.image, none);
 }
 
-/// The slots of a tile's intersections belong to it alone and are set to zero first.
+/// The slots of a tile's intersections belong to it alone, and are set to zero first.
 inline void backward_tile(const Work& work, std::uint32_t tile, Hits& hits) {
     const BlendFrame& f = work.frame;
     BlendPartials& out = *work.partials;

@@ -9,7 +9,7 @@ void NativeSort::sort(std::vector<std::uint32_t>& keys, std::vector<std::uint32_
     const std::size_t n = keys.size();
     keys_.resize(n);
     values_.resize(n);
-    std::array<std::array<std::uint32_t, 256>, 4> count{};  // of all digits in one walk
+    std::array<std::array<std::uint32_t, 256>, 4> count{};  // counts all digits in one pass
     for (const std::uint32_t key : keys)
         for (std::size_t digit = 0; digit < 4; ++digit) ++count[digit][key >> (8 * digit) & 255u];
     for (std::size_t digit = 0; digit < 4; ++digit) {

@@ -1,4 +1,4 @@
-// Sort and scan in plain C++ on one thread: what the device's are held against.
+// Sort and scan in plain C++ on one thread, with which those of the device are compared.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace darb {
 
-/// Stable, least significant digit first, 8 bits a pass; the temporaries are kept between calls.
+/// Stable, least significant digit first, 8 bits per pass. Temporaries are kept between calls.
 class NativeSort {
   public:
     void sort(std::vector<std::uint32_t>& keys, std::vector<std::uint32_t>& values);

@@ -11,7 +11,7 @@ namespace darb {
 nlohmann::json spread_json(const Spread& spread);
 std::string cost_table(const CostResult& result);
 nlohmann::json cost_json(const CostResult& result);
-/// title: the scene. A whole page without outside resources.
+/// A whole page without external resources. title: name of the scene.
 std::string cost_html(const CostResult& result, const std::string& title);
 
 }  // namespace darb

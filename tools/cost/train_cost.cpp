@@ -1,9 +1,9 @@
 #include "tools/cost/train_cost.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fmt/format.h>
 #include <map>
 
 #include "engine/check/device_walk.h"
@@ -264,7 +264,7 @@ std::vector<std::vector<TrainedRun>> train_by_turns(
     const std::function<void(const std::string&)>& progress) {
     OneRank alone;
     Ranks& ranks = plan.ranks ? *plan.ranks : static_cast<Ranks&>(alone);
-    std::vector<double> own;  // of each run its ms and its curve
+    std::vector<double> own;  // ms and curve of each run of this rank
     SplatModel model;
     for (int seed = 0; seed < plan.seeds; ++seed)
         for (size_t r = 0; r < rows.size(); ++r) {

@@ -1,4 +1,4 @@
-// The views that `darb cost` measures on: those of a data set with their photos, or eight around
+// The views that `darb cost` measures on: those of a data set, with their photos, or eight around
 // the splats.
 #pragma once
 
@@ -17,12 +17,13 @@ struct CostViews {
     bool alpha_is_mask = false;
 };
 
-/// Up to `most` test views, evenly picked; all views where none is held out.
-/// Those of an arc only where there are no others. Loads the photos.
+/// Up to `most` test views, evenly picked, or of all views where none is held out. Views of an arc
+/// are taken only where there are no others. Loads the photos.
 CostViews dataset_views(const Dataset& dataset, size_t most);
 
-/// `count` cameras on a circle that look slightly down (y is down) at the splats' centre, far
-/// enough for nine tenths of the opacity to be in the picture. For models with at least one splat.
+/// `count` cameras on a circle that look slightly down (y is down) at the splats' centre, from far
+/// enough away to have nine tenths of the opacity in the picture. The model must have at least one
+/// splat.
 CostViews orbit_views(const SplatModel& model, int count, int width, int height);
 
 }  // namespace darb

@@ -17,7 +17,7 @@ namespace darb {
 
 namespace {
 
-constexpr double kHalfWidth = 3;  // of the signals: width 6
+constexpr double kHalfWidth = 3;  // the signals are 6 wide
 constexpr double kBeta1 = 0.9, kBeta2 = 0.999, kEpsilon = 1e-8;
 constexpr int kParameters = 4;
 

@@ -12,12 +12,12 @@
 
 namespace darb {
 
-/// Of one data set: keeps the features of its photos, as far as they fit into `room` bytes. Those
-/// of a photo of 1.6 million px are 0.8 GB with VGG16.
+/// LPIPS for one data set. Keeps the features of its photos as far as they fit into `room` bytes;
+/// for a photo of 1.6 million px, they take 0.8 GB with VGG16.
 class ViewLpips {
   public:
     explicit ViewLpips(const Lpips* lpips, std::size_t room = std::size_t{1} << 29)
-        : lpips_(lpips), room_(room) {}  // null: measures nothing
+        : lpips_(lpips), room_(room) {}  // lpips null: measures nothing
     /// Fills lpips of every view with a picture on disk, and the mean where every view has one.
     void measure(ComparedRun& run);
 
@@ -27,17 +27,18 @@ class ViewLpips {
     double distance(const ComparedView& view, const HeldOutPicture& picture);
 
     const Lpips* lpips_;
-    std::size_t room_;                             // left
+    std::size_t room_;                             // bytes left
     std::map<std::string, LpipsFeatures> photos_;  // by view
 };
 
-/// run.exit_code of an exception as main has it: 2 for what the user can mend, 1 else; 1 is kept.
+/// Sets run.exit_code as main would for the exception: 2 for what the user can mend, else 1; a 1
+/// stays.
 void count_exception(const std::exception& e, ComparedRun& run);
 
-/// An exception of the measurement becomes a note that names it; the run stays as it is.
+/// Runs the measurement; an exception becomes a note that names it, and the run stays as it is.
 void attempt(ComparedRun& run, const std::string& what, const std::function<void()>& measurement);
 
-/// run.blending, of the last saved model, over at most `views` of the cameras.
+/// Sets run.blending from the last saved model, over at most `views` of the cameras.
 void measure_blending_of(ComparedRun& run, Device& device, std::vector<Camera> cameras, int views);
 
 }  // namespace darb

@@ -1,5 +1,5 @@
 // Training runs of several kernels on several data sets, side by side: what is read from their
-// output folders, what is measured on their scenes, and the page with all of it.
+// output folders, what is measured on their scenes, and the page that shows it all.
 #pragma once
 
 #include <array>
@@ -18,15 +18,15 @@
 namespace darb {
 
 struct BlendStatistics {
-    double blended_per_pixel = 0;  // splats with alpha at or over the cut-off, before the stop
+    double blended_per_pixel = 0;  // splats with alpha at or above the cut-off, before the stop
     double intersections_per_splat = 0;  // splat-tile intersections over visible splats
-    double blend_ms = 0;                 // of the forward blend pass a frame, median of the repeats
-    double frame_ms = 0;                 // of all forward passes
-    double ns_per_splat_pixel = 0;       // blend_ms over splats blended, all pixels
+    double blend_ms = 0;                 // forward blend pass per frame, median of the repeats
+    double frame_ms = 0;                 // all forward passes
+    double ns_per_splat_pixel = 0;       // blend_ms divided by splats blended over all pixels
 };
 
-/// Means over the cameras, of which there must be one; counts from the reference in double, times
-/// by the device's timestamps (0 where it has none).
+/// Means over the cameras, of which there must be at least one. Counts come from the reference in
+/// double, times from the device's timestamps (0 where it has none).
 BlendStatistics measure_blending(Device& device, const SplatModel& model,
                                  const std::vector<Camera>& cameras, int repeats = 5);
 
@@ -38,22 +38,25 @@ struct ComparedView {
 };
 
 struct ComparedScale {  // pictures of another size than that of training
-    double scale = 1;   // of the sides
+    double scale = 1;   // factor on the sides
     double psnr_db = 0, ssim = 0;
 };
 
 struct ComparedAt {  // an evaluation of one run
     int iteration = 0;
-    double seconds = 0;  // of training
+    double seconds = 0;  // training time so far
     double psnr_db = 0, ssim = 0;
     std::optional<double> lpips;
     double splats = 0;
-    std::optional<double> model_mb;  // of its PLY file, 10^6 bytes; none where it was not saved
-    std::filesystem::path model;     // that file
+    std::optional<double> model_mb;  // size of its PLY file, 10^6 bytes; empty where it was not
+                                     // saved
+    std::filesystem::path model;     // path of that file
     std::vector<ComparedView> views;
-    std::vector<ComparedScale> scales;  // of --scales, where the model was saved
-    std::optional<double> arc_db;       // PSNR of an arc that was held out beside other views
-    std::optional<double> off_path_db;  // PSNR there, where the data set has such views
+    std::vector<ComparedScale> scales;  // for each of --scales, where the model was saved
+    std::optional<double> arc_db;       // PSNR of a held-out arc, where other views are held out,
+                                        // too
+    std::optional<double> off_path_db;  // PSNR away from the path of the cameras, where the data
+                                        // set has such views
 };
 
 struct CurvePoint {
@@ -61,11 +64,11 @@ struct CurvePoint {
     double seconds = 0, loss = 0, splats = 0;
 };
 
-/// Exponents that splats are drawn with, of a kernel whose shape each splat learns.
+/// The exponents that splats are drawn with, for a kernel whose shape each splat learns.
 struct LearnedShapes {
     static constexpr std::array kPercentiles = {1, 10, 50, 90, 99};
-    std::vector<double> edges;        // of the bins, rising, one more than shares
-    std::vector<double> shares;       // of the splats; they add up to 1
+    std::vector<double> edges;        // edges of the bins, rising, one more than shares
+    std::vector<double> shares;       // shares of the splats; their sum is 1
     std::vector<double> percentiles;  // kPercentiles of the exponents
 };
 
@@ -73,12 +76,12 @@ struct ComparedRun {
     std::string kernel;  // its name
     std::uint64_t seed = 0;
     std::filesystem::path folder;
-    std::string failure;         // what ended it; empty where it is finished
-    std::string notes;           // what could not be read or measured; empty or sentences
-    int exit_code = 0;           // that failure and notes call for
-    std::vector<ComparedAt> at;  // in steps; of a failed run those that it came to
+    std::string failure;         // why it ended; empty where it finished
+    std::string notes;           // sentences on what could not be read or measured; may be empty
+    int exit_code = 0;           // the exit code that failure and notes call for
+    std::vector<ComparedAt> at;  // by iteration; for a failed run, those that it reached
     std::vector<CurvePoint> curve;
-    std::optional<double> peak_mb;  // of device memory, over the whole run, 10^6 bytes
+    std::optional<double> peak_mb;  // peak of device memory over the whole run, 10^6 bytes
     std::optional<BlendStatistics> blending;
     std::optional<LearnedShapes> shapes;
 };
@@ -93,34 +96,33 @@ struct Comparison {
     std::vector<ComparedDataset> datasets;
     std::vector<std::string> kernels;  // names, in the order of the tables
     std::vector<int> iterations;       // ascending
-    std::vector<double> scales;        // that pictures were measured at beside that of training
+    std::vector<double> scales;        // at which pictures were measured, besides that of training
     int seeds = 1;
-    std::string settings;    // what was asked for, in words
+    std::string settings;    // what the user asked for, as text
     std::string device;      // name and driver
     std::string lpips_note;  // which LPIPS, or why there is none
 };
 
 enum class RunState { none, partial, finished };
 
-/// What lies in the output folder of a training run that was to have these settings (settings_text)
-/// and this list of cameras. finished: metrics.json of a whole run. partial: a checkpoint alone.
-/// Throws Error where what is there has other settings, cameras, numbers of views or a
-/// choice of held-out ones (hold_out_text).
+/// What the output folder of a training run holds, given the settings (settings_text) and the
+/// list of cameras it should have. finished: metrics.json of a complete run. partial: only a
+/// checkpoint. Throws Error where the folder has other settings, cameras, numbers of views, or
+/// another choice of held-out views (hold_out_text).
 RunState run_state(const std::filesystem::path& folder, const std::string& settings,
                    const std::string& cameras, int iterations, std::size_t held_out,
                    const std::string& hold_out = hold_out_text({}));
 
 /// Fills at, curve and peak_mb from metrics.json and run.jsonl in run.folder, for those of
-/// `iterations` that were evaluated, and notes with those that were not. Throws Error naming the
-/// file.
+/// `iterations` that were evaluated, and adds notes about the others. Throws Error naming the file.
 void read_run(ComparedRun& run, const std::vector<int>& iterations);
 
-/// The same from run.jsonl alone, for a run that did not get to its end: nothing where the log is
-/// missing or that of other settings or cameras.
+/// Fills them from run.jsonl alone, for a run that did not finish. Does nothing where the log is
+/// missing, or belongs to other settings or cameras.
 void read_unfinished_run(ComparedRun& run, const std::vector<int>& iterations,
                          const std::string& settings, const std::string& cameras);
 
-/// Of the three parts of a held-out picture.
+/// The three parts of a held-out picture.
 struct HeldOutPicture {
     ImageU8 photo, render;
 };
@@ -128,7 +130,7 @@ HeldOutPicture read_held_out(const std::filesystem::path& picture);
 
 std::string comparison_table(const Comparison& comparison);
 nlohmann::json comparison_json(const Comparison& comparison);
-/// A whole page without outside resources. Reads the held-out pictures of the first seed.
+/// A whole page without external resources. Reads the held-out pictures of the first seed.
 std::string comparison_html(const Comparison& comparison);
 
 }  // namespace darb

@@ -1,4 +1,4 @@
-// Finished runs on their way from one rank to another.
+// Sends finished runs from one rank to another.
 #pragma once
 
 #include <vector>
@@ -8,12 +8,13 @@
 
 namespace darb {
 
-/// Every field, infinite and missing numbers among them; of this version of darb alone.
+/// Every field, including infinite and missing numbers; can be read only by the same version of
+/// darb.
 Bytes bytes_of_runs(const std::vector<ComparedRun>& runs);
 std::vector<ComparedRun> runs_of_bytes(std::span<const std::byte> bytes);
 
-/// What all ranks did, in the order of the items: see turn_of. Where one ended early, its later
-/// items are left out.
+/// The runs of all ranks in the order of their items: see turn_of. Where a rank ended early, its
+/// later items are missing.
 std::vector<ComparedRun> runs_of_all(Ranks& ranks, const std::vector<ComparedRun>& own,
                                      std::size_t items);
 

@@ -1,4 +1,4 @@
-// Medians over the seeds of a comparison, and who is best.
+// Medians over the seeds of a comparison, and which kernel is best.
 #pragma once
 
 #include <functional>
@@ -12,11 +12,11 @@
 
 namespace darb {
 
-/// "1/2", "2.5": a scale in tables.
+/// A scale as tables show it: "1/2", "2.5".
 std::string scale_text(double scale);
 
 struct OverSeeds {
-    std::optional<double> median;  // none where no run has the value
+    std::optional<double> median;  // empty where no run has the value
     double low = 0, high = 0;
     int count = 0;
 };
@@ -25,33 +25,33 @@ struct OverSeeds {
 struct Column {
     std::string name;  // "PSNR"
     std::string unit;  // "dB"; may be empty
-    std::string json;  // name in JSON
+    std::string json;  // key in JSON
     int decimals = 2;
     bool more_is_better = true;
     std::function<std::optional<double>(const ComparedRun&, const ComparedAt&)> value;
 };
 /// PSNR, SSIM, LPIPS, model MB, splats, peak MB, seconds.
 const std::vector<Column>& quality_columns();
-/// These and, after the first, PSNR at each of the comparison's scales and off the path.
+/// Those and, after the first, PSNR at each of the comparison's scales and off the path.
 std::vector<Column> every_column(const Comparison& comparison);
-/// Those that a table shows: without LPIPS and views off the path where no run has them.
+/// The columns that a table shows: without LPIPS and views off the path where no run has them.
 std::vector<Column> shown_columns(const Comparison& comparison);
 /// splats blended per pixel, intersections per splat, ns per splat-pixel, blend ms, frame ms.
 const std::vector<Column>& blending_columns();
 
-/// Of a failed run what it came to counts.
+/// For a failed run, the last value it reached counts.
 OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, int iteration,
                      const Column& column);
 
-/// best: none is better; third: two are. Of values as they are printed, so all that look the same
-/// are marked the same.
+/// best: no value is better; third: two are. Values are compared as printed, so that those which
+/// look equal get equal marks.
 enum class Mark { none, best, third };
 using Marks = std::vector<Mark>;
-/// One mark a value; none at all where there is one value or where all are the same.
+/// One mark per value; none at all where there is only one value, or all are equal.
 Marks marks_of(const std::vector<std::optional<double>>& values, const Column& column);
 
-/// The same over seeds: best is what no other overlaps, from its lowest to its highest; third is
-/// left out where seeds have a range.
+/// Marks over several seeds: best is a value whose range, lowest to highest, no other overlaps.
+/// There is no third where seeds have a range.
 Marks marks_over_seeds(const std::vector<OverSeeds>& values, const Column& column);
 
 /// "27.31" or, over several seeds, "27.31 (27.10 to 27.44)"; "-" without a value.
@@ -62,28 +62,29 @@ std::string spread_text(const OverSeeds& value, int decimals);
 
 struct Means {
     std::string benchmark;           // empty: all data sets
-    std::vector<std::string> names;  // of the data sets
-    /// [column][kernel], over the data sets where every kernel has the value.
+    std::vector<std::string> names;  // names of the data sets
+    /// [column][kernel] means over the data sets in which every kernel has the value.
     std::vector<std::vector<std::optional<double>>> values;
-    std::vector<int> covered;  // [column] how many these are
-    /// [column][kernel], over the same names; none where the paper has no such column or kernel.
+    std::vector<int> covered;  // [column] number of those data sets
+    /// [column][kernel] the paper's means over the same names; empty where it lacks the column or
+    /// kernel.
     std::vector<std::vector<std::optional<double>>> paper;
 };
 
-/// Of columns at one iteration, the groups that hold more than one data set; all data sets are left
-/// out where they are one benchmark.
+/// The groups with more than one data set, with means of the columns at one iteration. Where all
+/// data sets belong to one benchmark, the group of all is left out.
 std::vector<Means> means_of(const Comparison& comparison, int iteration,
                             const std::vector<Column>& columns);
 
 nlohmann::json means_json(const Comparison& comparison);
 
-// The paper's claim that more pulses than one take less memory and give less quality, on the runs
-// of a comparison.
+// Tests the paper's claim that more than one pulse takes less memory and gives less quality, on the
+// runs of a comparison.
 
-/// A kernel with several pulses against the same kernel with one, medians over seeds. None where
-/// one of the two has no such number.
+/// A kernel with several pulses compared with the same kernel with one, by medians over seeds.
+/// Empty where one of the two lacks the figure.
 struct PulseChange {
-    std::string kernel;  // of one pulse
+    std::string kernel;  // name of the kernel with one pulse
     int pulses = 0;
     std::optional<double> psnr_db, ssim;                 // differences
     std::optional<double> splats, model, peak, seconds;  // ratios
@@ -93,26 +94,27 @@ struct PulseChange {
     bool less_ssim() const { return ssim && *ssim < 0; }
 };
 
-/// Every kernel of the comparison that was run with one pulse and with more.
+/// Every kernel of the comparison that was run with one pulse and with several.
 std::vector<PulseChange> pulse_changes(const Comparison& comparison, const ComparedDataset& dataset,
                                        int iteration);
 
-/// All empty where there is no such kernel.
+/// As sentences; all empty where there is no such kernel.
 std::string pulse_lines(const Comparison& comparison, const ComparedDataset& dataset);
 std::string pulse_html(const Comparison& comparison, const ComparedDataset& dataset);
 nlohmann::json pulse_json(const Comparison& comparison, const ComparedDataset& dataset);
 
-// Does a scene want one kernel or many? The shapes that splats learned in the runs of a comparison.
+// Whether a scene wants one kernel or many: the shapes that splats learned in the runs of a
+// comparison.
 
-/// Of the splats that are drawn (opacity at or over the cut-off). None where the kernel has no
-/// shape, and where no splat is drawn.
+/// The shapes of visible splats (opacity at or above the cut-off). Nothing where the kernel has no
+/// shapes, or no splat is visible.
 std::optional<LearnedShapes> learned_shapes(const SplatModel& model);
 
-/// run.shapes, of the last saved model.
+/// Sets run.shapes from the last saved model.
 void read_shapes_of(ComparedRun& run);
 
 /// A plot for each kernel that learns shapes, with a curve for each data set, and a table of
-/// percentiles, all of the first seed that is there; empty where there is no such kernel.
+/// percentiles, all from the first seed available; empty where there is no such kernel.
 std::string shapes_html(const Comparison& comparison);
 nlohmann::json shapes_json(const LearnedShapes& shapes);
 

@@ -1,12 +1,12 @@
 #include "tools/paper/lpips.h"
 
+#include <fmt/format.h>
 #include <Eigen/Core>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <fmt/format.h>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -111,10 +111,10 @@ Tensors read_safetensors(const std::filesystem::path& path) {
 
 namespace {
 
-// Of the package's ScalingLayer, for colours in [-1, 1].
+// Constants of the package's ScalingLayer, for colours in [-1, 1].
 constexpr float kShift[3] = {-0.030f, -0.088f, -0.188f}, kScale[3] = {0.458f, 0.448f, 0.450f};
 constexpr float kLengthEpsilon = 1e-10f;
-constexpr std::size_t kColumnFloats = 1u << 20;  // of one block of unfolded patches: 4 MiB
+constexpr std::size_t kColumnFloats = 1u << 20;  // one block of unfolded patches: 4 MiB
 
 struct Plane {
     int width = 0, height = 0;
@@ -172,7 +172,7 @@ Plane max_pool(const Plane& in, int side) {
     return out;
 }
 
-/// Of the output, [first, last).
+/// Rows [first, last) of the output.
 struct OutputRows {
     int width, first, last;
 };

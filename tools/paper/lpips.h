@@ -1,5 +1,5 @@
 // LPIPS, the learned perceptual distance of two pictures (Zhang et al. 2018, version 0.1), on the
-// CPU, with the weights of files that the user gives.
+// CPU, with weights from files that the user provides.
 #pragma once
 
 #include <cstddef>
@@ -20,16 +20,17 @@ struct Tensor {
 
 using Tensors = std::map<std::string, Tensor>;
 
-/// Throws Error naming the file and the tensor: no safetensors file, truncated, sizes that do not
-/// fit, or a type other than F32, F16, BF16 and F64 (which become float32; integers are left out).
+/// Throws Error naming the file and the tensor where this is not a safetensors file, is truncated,
+/// has inconsistent sizes, or a type other than F32, F16, BF16 and F64 (which become float32;
+/// integers are skipped).
 Tensors read_safetensors(const std::filesystem::path& path);
 Tensors parse_safetensors(std::span<const std::byte> file, const std::string& where);
 
 enum class LpipsNet { alexnet, vgg16 };
 
 struct LpipsOptions {
-    /// The package and its paper move colours from [0, 1] to [-1, 1] first. The evaluation code of
-    /// 3DGS does not, and published numbers of splat papers are without it.
+    /// LPIPS and its paper map colours from [0, 1] to [-1, 1] first. The evaluation code of 3DGS
+    /// does not, and numbers published in splat papers are without it.
     bool as_3dgs = false;
     int threads = 0;  // 0: one per core
 };
@@ -51,18 +52,18 @@ struct LpipsFeatures {
 
 class Lpips {
   public:
-    /// Tensors of all files together. Trunk: features.N.weight and .bias as torchvision names them
-    /// (AlexNet 0 3 6 8 10; VGG16 0 2 5 7 10 12 14 17 19 21 24 26 28), or net.sliceK.N.* as in the
-    /// lpips package. Heads: linK.model.1.weight, K = 0 to 4. The size of the first filter tells
-    /// the net. Throws Error naming the tensor that is missing, has another shape, or is in two
-    /// files.
+    /// The tensors of all files together. Trunk: features.N.weight and .bias as torchvision names
+    /// them (AlexNet 0 3 6 8 10; VGG16 0 2 5 7 10 12 14 17 19 21 24 26 28), or net.sliceK.N.* as in
+    /// the lpips package. Heads: linK.model.1.weight, K = 0 to 4. The size of the first filter
+    /// determines the network. Throws Error naming a tensor that is missing, has a wrong shape, or
+    /// is in two files.
     explicit Lpips(const std::vector<std::filesystem::path>& files,
                    const LpipsOptions& options = {});
     Lpips(const Tensors& tensors, const std::string& where, const LpipsOptions& options = {});
 
     LpipsNet net() const { return net_; }
     std::string_view net_name() const;  // "AlexNet", "VGG16"
-    /// Pictures need at least this many px each way.
+    /// The least width and height of pictures, px.
     int least_size() const { return net_ == LpipsNet::alexnet ? 31 : 16; }
 
     /// image: RGB in [0, 1].

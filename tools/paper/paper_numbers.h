@@ -1,5 +1,5 @@
-// What the paper prints per scene: DARB-Splatting, arXiv 2501.12369, supplementary Tables 1 and 2.
-// One RTX 4090, single runs.
+// The figures that the paper prints per scene: DARB-Splatting, arXiv 2501.12369, supplementary
+// Tables 1 and 2. One RTX 4090, single runs.
 #pragma once
 
 #include <span>
@@ -18,13 +18,15 @@ struct PaperNumbers {
 /// 13 scenes, 5 kernels, 2 numbers of iterations.
 std::span<const PaperNumbers> paper_numbers();
 
-/// Those of the scene whose name is the data set's, in any case; empty where there is none.
+/// The figures for the scene that has the data set's name, ignoring case; empty where there is
+/// none.
 std::vector<PaperNumbers> paper_numbers_of(std::string_view dataset);
 
 /// "Mip-NeRF 360", "Tanks and Temples", "Deep Blending".
 std::span<const std::string_view> paper_benchmarks();
 
-/// The one that has a scene of the data set's name, in any case; empty where none has.
+/// The benchmark with a scene that has the data set's name, ignoring case; empty where there is
+/// none.
 std::string_view paper_benchmark_of(std::string_view dataset);
 
 }  // namespace darb

@@ -9,9 +9,9 @@
 
 namespace darb {
 
-/// value(x, y) of pixels [0, size)^2 as grey, 0 black and `white` white.
+/// value(x, y) at pixels [0, size)^2 as grey, from 0 (black) to `white` (white).
 ImageU8 grey_field(int size, double white, const std::function<double(int, int)>& value);
-/// The same in blue (below 0), white (0) and red (above 0), full at +-limit.
+/// value(x, y) in blue (below 0), white (0) and red (above 0), saturated at +-limit.
 ImageU8 signed_field(int size, double limit, const std::function<double(int, int)>& value);
 
 struct Captioned {

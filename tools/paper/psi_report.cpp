@@ -1,8 +1,8 @@
 #include "tools/paper/psi_report.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 
 #include "engine/core/text.h"
@@ -150,7 +150,7 @@ std::string fits_html(const std::vector<KernelFit>& fits) {
 
 namespace {
 
-constexpr int kPoints = 241;    // of a curve
+constexpr int kPoints = 241;    // points of a curve
 constexpr int kFieldSize = 96;  // px of a picture of a field
 constexpr double kFieldHalf = 5.2;
 constexpr double kNoResidual = 1e-6;  // largest difference: rounding alone

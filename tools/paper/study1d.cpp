@@ -1,9 +1,9 @@
 #include "tools/paper/study1d.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <mutex>
 
@@ -135,7 +135,7 @@ namespace {
 
 constexpr double kCellWidth = 150, kCellHeight = 62, kNameWidth = 120, kHead = 46;  // user units
 constexpr int kCurvePoints = 240;
-constexpr double kLowest = -0.35, kHighest = 1.35;  // of the y axis of a cell
+constexpr double kLowest = -0.35, kHighest = 1.35;  // range of the y axis of a cell
 
 std::string_view signal_name(int signal) {
     return signals_1d()[static_cast<std::size_t>(signal)].name;

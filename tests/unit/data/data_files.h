@@ -12,7 +12,7 @@
 
 namespace darb {
 
-/// The folder of the data sets; a name that is nowhere where there is none.
+/// The folder of the data sets; a name that does not exist where there is none.
 inline std::filesystem::path test_data() {
     return test::test_data_folder().value_or("no-test-data");
 }

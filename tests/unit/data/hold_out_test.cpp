@@ -80,7 +80,7 @@ TEST(HoldOut, arc_is_one_stretch_of_the_way_around) {
         int ends = 0;  // held, and the next on the ring is not
         for (const int p : held) ends += held.contains((p + 1) % 20) ? 0 : 1;
         EXPECT_EQ(ends, 1);
-        // Of an open way the middle, so that there are photos on both sides.
+        // Where the way round is open, the arc is in its middle, with photos on both sides.
         if (share < 1) {
             EXPECT_EQ(held, (std::set<int>{7, 8, 9, 10, 11}));
         }

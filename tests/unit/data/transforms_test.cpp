@@ -509,7 +509,7 @@ TEST(TransformsSource, smaller_photos_get_the_lens_of_those_that_the_file_names)
 TEST(TransformsSource, cameras_alone_do_without_photos_that_cannot_be_used) {
     const auto folder = test_folder();
     write_file_atomic(folder / "a.webp", std::string("RIFF"));
-    write_png(folder / "b.png", ImageU8(8, 8, 3));  // of another aspect
+    write_png(folder / "b.png", ImageU8(8, 8, 3));  // has another aspect ratio
     write_file_atomic(folder / "transforms.json", file(R"("w": 8, "h": 6, "fl_x": 10, )",
                                                        frame("a.webp") + "," + frame("b.png")));
     std::vector<std::string> notes;

@@ -10,7 +10,7 @@
 namespace darb {
 namespace {
 
-constexpr double kRounding = 3e-7;  // of float32 arithmetic, on w
+constexpr double kRounding = 3e-7;  // effect of float32 arithmetic on w
 constexpr double kCutoff = 1 / 255.0;
 
 double extent(const KernelCoefficients& k) {

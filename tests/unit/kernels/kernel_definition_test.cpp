@@ -109,7 +109,7 @@ TEST(KernelDefinition, Order_of_the_edge_is_found) {
             "");
         EXPECT_EQ(d.edge_order, order);
         EXPECT_LT(d.error, 1e-12);
-        ASSERT_EQ(d.notes.size(), 1u);  // of the division
+        ASSERT_EQ(d.notes.size(), 1u);  // about the division
         EXPECT_EQ(d.notes[0], "w(0) is 0.333333: divided by it");
     }
 }

@@ -95,7 +95,8 @@ TEST(KernelFamily, FiveKernels_differPairwise) {
 
 TEST(KernelFamily, EqualAreaScale_isTheClosedForm) {
     const double p2 = pi * pi;
-    const auto expect = [](int k, double half_integral) {  // of w dq: 1 for a Gaussian
+    const auto expect = [](int k, double half_integral) {  // half_integral: of w dq, 1 for a
+                                                           // Gaussian
         EXPECT_NEAR(equal_area_scale(k, Footprint::psi),
                     1 / std::sqrt(kernel_psi(k) * half_integral), 1e-13)
             << kernel_name(k);

@@ -19,7 +19,7 @@ double w_of(double t, double q) {
     return kExponential.value(Footprint::psi, t, q).w;
 }
 
-/// Of f over [0, to], points close together at 0.
+/// The integral of f over [0, to], with points close together at 0.
 template <class F>
 double integral_from_0(double to, const F& f, int steps = 200'000) {
     double sum = 0;

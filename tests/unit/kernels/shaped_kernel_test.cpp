@@ -95,7 +95,8 @@ TEST(ShapedKernel, Exponent_isHeldBetweenItsBounds) {
     EXPECT_DOUBLE_EQ(kBeta.exponent(Footprint::psi, beta_shape_of(7.25)), 7.25);
 }
 
-// Of (1 - r^2/R^2)^b: the line integral at q, over that at 0; and the moments in space and plane.
+// Integrates (1 - r^2/R^2)^b numerically: the line integral at q over that at 0, and the moments in
+// space and in the plane.
 TEST(ShapedKernel, FootprintsAndMoments_areTheIntegrals) {
     for (const double b : {1.0, 2.7, 4.0, 30.0}) {
         const auto w = [&](double q) { return q < kR2 ? std::pow(1 - q / kR2, b) : 0; };

@@ -35,8 +35,9 @@ TEST(Roofline, harmonics_that_step_seldom_move_less) {
     const PassWork each = *pass_work("project backward", counts);
     counts.rest_every = 16;
     const PassWork seldom = *pass_work("project backward", counts);
-    // Of 1,000 splats three loads and stores of 24 floats; the sum's of those seen, at a step of
-    // all.
+    // In 15 of 16 steps, 1,000 splats save three loads and stores of 24 floats. The sum of
+    // gradients costs one load and store: for the 800 splats seen in these steps, and for all in
+    // the sixteenth.
     EXPECT_DOUBLE_EQ(each.bytes - seldom.bytes,
                      1000 * 24 * 24 * (1 - 1.0 / 16) - (800 * 15.0 / 16 + 1000.0 / 16) * 8 * 24);
     EXPECT_EQ(each.fma, seldom.fma);

@@ -14,7 +14,7 @@ namespace darb::test {
 namespace {
 
 constexpr double kStep = 1e-6;
-constexpr double kMaxBandRatio = 0.02;  // of the parameters of a scene
+constexpr double kMaxBandRatio = 0.02;  // share of a scene's parameters
 
 struct GradientCase {
     SceneOptions scene;

@@ -1,4 +1,4 @@
-// Scenes of one or a few splats whose image can be worked out by hand, and differences.
+// Scenes of one or a few splats whose image can be worked out by hand, and finite differences.
 #pragma once
 
 #include <cmath>

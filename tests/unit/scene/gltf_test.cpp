@@ -134,7 +134,7 @@ TEST(Gltf, every_kernel_comes_back_bit_by_bit) {
             model.footprint = footprint;
             model.antialias = true;
             model.origin = {450012.25, -3, 5000012.5};
-            for (float& part : model.rotation) part *= 3;  // of any length
+            for (float& part : model.rotation) part *= 3;  // any length is allowed
             const SplatModel got = read(glb(model));
             EXPECT_TRUE(same_splats(got, model)) << kernel_name(kernel);
             EXPECT_EQ(got.kernel, kernel);

@@ -166,7 +166,7 @@ TEST(OwnKernelFile, A_header_cut_or_changed_at_every_byte_is_a_scene_or_an_error
             }
 }
 
-/// Of the same length: the chunks of a .glb stay as they are.
+/// `from` and `to` must have equal lengths, so that the chunks of a .glb keep their places.
 std::vector<std::byte> changed(std::vector<std::byte> file, std::string_view from,
                                std::string_view to) {
     EXPECT_EQ(from.size(), to.size());

@@ -157,7 +157,7 @@ TEST(ShapedScene, gaussians_of_ges_published_are_what_it_draws) {
     for (std::size_t i = 0; i < model.size(); ++i) {
         const double f = 2 / (1 + std::exp(-0.1 * double{model.shape[i]}));
         EXPECT_NEAR(gaussians.log_scale[3 * i] - model.log_scale[3 * i], std::log(f), 1e-5);
-        const float logit = std::min(model.opacity_logit[i], 4.0f);  // of opaque ones it is bounded
+        const float logit = std::min(model.opacity_logit[i], 4.0f);  // opacities near 1 are limited
         EXPECT_NEAR(std::min(gaussians.opacity_logit[i], 4.0f), logit, 1e-3);
     }
 }

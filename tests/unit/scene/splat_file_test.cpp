@@ -224,7 +224,7 @@ TEST(SplatFile, splats_without_a_rotation_are_left_out_where_they_would_get_one)
     SplatModel model = sample_model(0, 4);
     for (size_t k = 0; k < 4; ++k) {
         model.rotation[4 + k] = 0;
-        model.rotation[8 + k] = 4e-7f;  // of length 8e-7: not drawn either
+        model.rotation[8 + k] = 4e-7f;  // has length 8e-7: not drawn either
     }
     EXPECT_EQ(parse_splats(encode_splats(SplatFormat::ply, model), "test").size(), 4u);
     EXPECT_TRUE(losses_of(SplatFormat::ply, model).empty());

@@ -69,7 +69,7 @@ TEST(Spz, one_splat_of_versions_1_to_3_decoded_by_hand) {
             for (int a = 0; a < 3; ++a)
                 for (int b = 0; b < 3; ++b)
                     EXPECT_NEAR(covariance_of(model, 0)[a][b], covariance_of(turned, 0)[a][b],
-                                version < 3 ? 2000 : 1e-2)  // of e^11.9; 1/127.5 in a component
+                                version < 3 ? 2000 : 1e-2)  // out of e^11.9; 1/127.5 per component
                         << version;
         }
 }
@@ -196,7 +196,7 @@ TEST(Spz, coordinate_systems_are_turned_to_right_down_forward) {
 TEST(Spz, what_is_no_extension_record_is_an_error_in_version_4_alone) {
     FileBytes file = one_spz_splat(3, 2);
     append_value<std::uint32_t>(0x12340001, file);
-    append_value<std::uint32_t>(1000, file);  // of which one byte is there
+    append_value<std::uint32_t>(1000, file);  // declares 1,000 bytes; one is there
     append_bytes({1}, file);
     SpzFacts facts;
     EXPECT_EQ(parse_spz(gzip(file), "test", &facts).size(), 1u);

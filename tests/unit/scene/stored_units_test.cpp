@@ -224,7 +224,7 @@ TEST(StoredUnits, positions_that_float32_cannot_hold_are_doubted) {
     }
     for (const SplatFormat format : {SplatFormat::ply, SplatFormat::dot_splat, SplatFormat::gltf})
         expect_doubt(doubts_of(model, format), "steps of 0.5, as float32");
-    std::vector<double> text;  // of six digits, as text has float32 numbers
+    std::vector<double> text;  // positions rounded to six digits, as text gives float32
     for (const float p : model.position) text.push_back(std::stod(fmt::format("{}", p)));
     SplatModel read = model;
     set_positions(text, read);

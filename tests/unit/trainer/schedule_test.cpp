@@ -37,7 +37,7 @@ TEST(OpacityReset, the_last_one_by_the_length_of_the_run) {
     options.iterations = 1;
     EXPECT_EQ(Schedule(options).resets.last, 0);
     options.iterations = 7'000;
-    options.densify_until = 15'000;  // of a longer run: growth ends with this one
+    options.densify_until = 15'000;  // meant for a longer run: growth ends with this one
     EXPECT_EQ(Schedule(options).resets.last, 3'000);
     options.densify_until.reset();
     use_3dgs_schedule(options);

@@ -57,7 +57,7 @@ TEST(Edit, Undo_and_redo_walk_the_steps) {
     EXPECT_EQ(edit.removed_count(), 4u);
     edit.undo(m);
     EXPECT_EQ(edit.removed_count(), 2u);
-    EXPECT_EQ(edit.removed()[1], 1);  // of the first step, stays deleted
+    EXPECT_EQ(edit.removed()[1], 1);  // removed by the first step, stays removed
     EXPECT_EQ(edit.removed()[2], 0);
     edit.undo(m);
     EXPECT_EQ(edit.removed_count(), 0u);

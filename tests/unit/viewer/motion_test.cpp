@@ -77,8 +77,8 @@ TEST(MotionControl, Resolution_is_given_up_before_splats) {
     EXPECT_GE(q.splats, 0.17);
 }
 
-// Of what fits into 0.85 of the target the nearest is taken, by motion_error; what takes 0.7 to
-// 1.0 of the target is kept.
+// Among the shares that fit into 0.85 of the target, the one nearest by motion_error is taken; one
+// that takes 0.7 to 1.0 of the target is kept.
 TEST(MotionControl, A_change_takes_the_nearest_that_fits_and_then_keeps_it) {
     const std::vector<double> shares = motion_shares(1'000'000, 0.5);
     const Modelled device{3, 90, 60};

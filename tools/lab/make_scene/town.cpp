@@ -11,12 +11,12 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kStreet = 1.2;  // of a block's side
-constexpr int kLots = 2;         // a side of a block
-constexpr double kFlight = 6;    // of the flight, world units
-constexpr double kClimb = 1.5;   // of every other view
+constexpr double kStreet = 1.2;  // width of a street, taken from a block's side
+constexpr int kLots = 2;         // lots along a block's side
+constexpr double kFlight = 6;    // height of the flight, world units
+constexpr double kClimb = 1.5;   // added for every other view
 constexpr double kTilt = 52;     // degrees below level
-constexpr double kBeyond = 0.8;  // of the flight, past the last houses' middle
+constexpr double kBeyond = 0.8;  // half the flight's extent, as a share of that of the town
 
 dvec3 colour(Pcg32& rng, double least, double most) {
     return {rng.uniform(least, most), rng.uniform(least, most), rng.uniform(least, most)};

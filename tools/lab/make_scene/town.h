@@ -1,5 +1,5 @@
-// A generated town for runs in blocks: a square of streets, houses and trees, far larger than what
-// one camera sees, and the flight over it.
+// A generated town for training in blocks: a square of streets, houses and trees, far larger than
+// what one camera sees, and a flight over it.
 #pragma once
 
 #include <vector>
@@ -10,18 +10,18 @@
 
 namespace darb::make_scene {
 
-constexpr int kTownBlocks = 4;         // a side: 16 blocks of houses
+constexpr int kTownBlocks = 4;         // per side: 16 blocks of houses
 constexpr double kTownBlockSide = 5;   // world units, street included
-constexpr int kTownTestEvery = 8;      // of so many views one is held out
-constexpr int kTownPointsAPhoto = 60;  // surface points for each photo
+constexpr int kTownTestEvery = 8;      // one view in this many is held out
+constexpr int kTownPointsAPhoto = 60;  // surface points per photo
 
 World town();
 
-/// `side` x `side` views at two heights, obliquely down in four headings by turns; scale multiplies
-/// the photos' sides of 200 x 150 px.
+/// `side` x `side` views at two heights, looking obliquely down in four headings in turn. scale
+/// multiplies the sides of the photos, 200 x 150 px.
 std::vector<View> town_flight(int side, double scale);
 
-/// What photos and points of the town are taken with.
+/// How photos and points of the town are captured.
 CaptureSettings town_capture(std::size_t views);
 
 }  // namespace darb::make_scene

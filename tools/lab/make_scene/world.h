@@ -1,4 +1,4 @@
-// Shapes of the generated scene, each in its own frame: centre at 0, axis along z.
+// Shapes of the generated scene, each in its own frame: centred on 0, with its axis along z.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -26,11 +26,11 @@ struct ShapeHit {
     glm::dvec3 normal;  // outward, unit length
 };
 
-/// The nearest hit with t in (t_min, t_max), ray and result in the shape's frame.
+/// The nearest hit with t in (t_min, t_max); ray and result are in the shape's frame.
 std::optional<ShapeHit> intersect(Shape shape, const glm::dvec3& size, const Ray& ray, double t_min,
                                   double t_max);
 
-/// Radius of a sphere around 0 that holds the shape.
+/// Radius of a sphere around 0 that contains the shape.
 double bounding_radius(Shape shape, const glm::dvec3& size);
 
 // Procedural albedo, linear RGB in [0, 1], from a point in the object's own frame.
@@ -39,11 +39,11 @@ constexpr double kTau = 2 * std::numbers::pi;
 
 enum class Texture { plain, checker, wood, marble, stripes, beach_ball, dots, tiles };
 
-/// p: point on the surface, n: normal there, colours a and b, period: world units.
+/// p: point on the surface; n: its normal; a and b: colours; period: world units.
 glm::dvec3 albedo(Texture texture, const glm::dvec3& p, const glm::dvec3& n, const glm::dvec3& a,
                   const glm::dvec3& b, double period);
 
-/// Smooth value noise in [0, 1], one bump per unit; sums of it over `octaves` for fbm.
+/// Smooth value noise in [0, 1], with one bump per unit; summed over `octaves` for fbm.
 double noise(const glm::dvec3& p);
 double fbm(glm::dvec3 p, int octaves);
 
@@ -54,7 +54,7 @@ struct Material {
     glm::dvec3 a{0.5}, b{0.5};  // linear RGB
     double period = 0.1;        // world units (stripes: share of a turn)
     double gloss = 0.04;        // reflectance seen head-on; 0 = none
-    double blur = 0.02;         // of the reflection, as the spread of its direction
+    double blur = 0.02;         // spread of the reflection's direction
     bool metal = false;         // tints the reflection with a, no diffuse part
 };
 
@@ -70,7 +70,8 @@ struct World {
     std::vector<Object> objects;
     Material floor;
     double floor_z = 0;
-    double fades_from = 2.6, fades_to = 7.5;  // the floor into the sky, by the distance from 0
+    double fades_from = 2.6, fades_to = 7.5;  // distances from 0 over which the floor fades into
+                                              // the sky
     double clouds = 0;                        // how white they are, 0 to 1
 };
 
@@ -79,7 +80,8 @@ World still_life();
 /// Distance to the nearest surface along the ray; negative: the sky.
 double depth_along(const World& world, const Ray& ray);
 
-/// Linear RGB along the ray, one random sample of soft shadow, occlusion and blurred reflection.
+/// Linear RGB along the ray, with one random sample of soft shadow, occlusion and blurred
+/// reflection.
 glm::dvec3 radiance(const World& world, const Ray& ray, Pcg32& rng);
 
 }  // namespace darb::make_scene

@@ -1,4 +1,4 @@
-// Writes the captured scene as a data set that darb and the other trainers of the field read.
+// Writes the captured scene as a data set that darb and other common trainers can read.
 #pragma once
 
 #include <filesystem>
@@ -7,17 +7,18 @@
 
 namespace darb::make_scene {
 
-/// FOLDER/images/NAME, sparse/0 (COLMAP, all views), test.txt (names of the held-out views, one a
-/// line), transforms_train.json and transforms_test.json (OpenGL camera frame). Throws Error.
+/// Writes FOLDER/images/NAME, sparse/0 (COLMAP, all views), test.txt (names of the held-out views,
+/// one per line), transforms_train.json and transforms_test.json (OpenGL camera frame). Throws
+/// Error.
 void write_scene(const std::filesystem::path& folder, const std::vector<View>& views,
                  const Capture& capture);
 
-/// FOLDER/images/NAME and transforms_test.json alone: a data set that is all held out. Throws
-/// Error.
+/// Writes only FOLDER/images/NAME and transforms_test.json: a data set whose views are all held
+/// out. Throws Error.
 void write_test_views(const std::filesystem::path& folder, const std::vector<View>& views,
                       const std::vector<ImageU8>& photos);
 
-/// FOLDER/depths: a 16-bit PNG a view, in millimetres.
+/// Writes FOLDER/depths: a 16-bit PNG per view, in millimetres.
 void write_depths(const std::filesystem::path& folder, const std::vector<View>& views,
                   const std::vector<ImageF>& depths);
 
