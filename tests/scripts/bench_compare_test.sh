@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # tools/lab/bench_compare.py on made-up results: what it calls faster, slower and noise.
 set -uo pipefail
-script=$(cd "$(dirname "$0")/../../tools" && pwd)/bench_compare.py
+script=$(cd "$(dirname "$0")/../../tools/lab" && pwd)/bench_compare.py
 # shellcheck source=check.sh
 source "$(dirname "$0")/check.sh"
 

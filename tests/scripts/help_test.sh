@@ -5,7 +5,7 @@ cd "$(dirname "$0")/../.."
 
 failed=0
 before=$(git status --porcelain 2>/dev/null || true)
-for script in tools/*.sh tools/*.py; do
+for script in tools/*.sh tools/*.py tools/lab/*.sh tools/lab/*.py; do
     if [[ $script == *.py ]]; then run=(python3 -B "$script"); else run=("$script"); fi
     text=$("${run[@]}" --help 2>/dev/null </dev/null) && code=0 || code=$?
     if [[ $code != 0 || ${#text} -lt 40 ]]; then

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # tools/lab/paper_tables.sh on a made-up ROOT: which scenes and sizes it hands to darb compare.
 set -uo pipefail
-script=$(cd "$(dirname "$0")/../../tools" && pwd)/paper_tables.sh
+script=$(cd "$(dirname "$0")/../../tools/lab" && pwd)/paper_tables.sh
 # shellcheck source=check.sh
 source "$(dirname "$0")/check.sh"
 

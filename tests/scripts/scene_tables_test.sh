@@ -3,8 +3,8 @@
 set -uo pipefail
 # shellcheck source=check.sh
 source "$(dirname "$0")/check.sh"
-mkdir -p "$folder/tools" "$folder/docs/experiments" "$folder/assets/results"
-cp "$(cd "$(dirname "$0")/../../tools" && pwd)/scene_tables.py" "$folder/tools"
+mkdir -p "$folder/tools/lab" "$folder/docs/experiments" "$folder/assets/results"
+cp "$(cd "$(dirname "$0")/../../tools/lab" && pwd)"/{scene_tables,results}.py "$folder/tools/lab"
 page=$folder/docs/experiments/kernels_on_photos.md figures=$folder/assets/results/scenes_lavapipe.json
 
 python3 - "$folder/compare.json" <<'TEXT'

@@ -22,3 +22,7 @@ def text(value, indent=0):
 def write(path, value):
     with open(path, "w", encoding="utf-8") as file:
         file.write(text(value) + "\n")
+
+
+if __name__ == "__main__":
+    print(__doc__)
