@@ -1,10 +1,10 @@
 #include "engine/plan/tuner.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <fmt/format.h>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -125,12 +125,13 @@ std::vector<TuningGroup> measured_groups(const DeviceInfo& info) {
     return groups;
 }
 
-// A frame by one choice of a group, which has run once and so has compiled; null where the driver
-// refuses it.
-std::unique_ptr<TuningFrame> frame_by(Device& device, const std::string& group,
-                                      const std::string& choice) try {
-    device.set_tuning(with_names(usual_tuning(device.info()), {{group, choice}}));
-    auto frame = std::make_unique<TuningFrame>(device);
+// A frame by these choices, which has run once and so has compiled; null where the driver refuses
+// them.
+std::unique_ptr<TuningFrame> frame_by(Device& device, const TuningNames& choices,
+                                      const TimedFrame* of_run = nullptr) try {
+    device.set_tuning(with_names(usual_tuning(device.info()), choices));
+    auto frame = of_run ? std::make_unique<TuningFrame>(device, *of_run)
+                        : std::make_unique<TuningFrame>(device);
     frame->run({});
     return frame;
 } catch (const DeviceLost&) {  // every other error is a form that this device lacks
@@ -139,30 +140,47 @@ std::unique_ptr<TuningFrame> frame_by(Device& device, const std::string& group,
     return nullptr;
 }
 
+// The best of these frames for a group, the first of which is the usual one.
+FormChoice compare(const Device& device, const TuningGroup& group,
+                   const std::vector<TuningFrame*>& frames, const std::vector<bool>& may_win = {}) {
+    const auto start = std::chrono::steady_clock::now();
+    const TimedForms forms{
+        [&](std::size_t form) { return frames[form]->run({group})[0]; },
+        [&] {
+            return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        }};
+    return choose_form(forms, frames.size(), effort_for(device.info()), may_win);
+}
+
 // Of one group: what it takes by each of its choices, and the best of them.
 void measure_group(Device& device, TuningFrame& usual, const TuningGroup& group,
                    double exp_tolerance, TuningRecord& record) {
     std::vector<std::string> names{group.choices.front()};
-    std::vector<std::unique_ptr<TuningFrame>> others(1);
+    std::vector<std::unique_ptr<TuningFrame>> others;
+    std::vector<TuningFrame*> frames{&usual};
     std::vector<bool> may_win{true};
     for (std::size_t w = 1; w < group.choices.size(); ++w) {
         if (group.name == "exp" && !(exp_error(device) <= exp_tolerance)) continue;
-        std::unique_ptr<TuningFrame> frame = frame_by(device, group.name, group.choices[w]);
+        std::unique_ptr<TuningFrame> frame = frame_by(device, {{group.name, group.choices[w]}});
         if (!frame) continue;
         names.push_back(group.choices[w]);
-        others.push_back(std::move(frame));
+        frames.push_back(others.emplace_back(std::move(frame)).get());
         may_win.push_back(may_be_chosen(group.choices[w]));
     }
-    const auto start = std::chrono::steady_clock::now();
-    const TimedForms forms{
-        [&](std::size_t form) { return (form == 0 ? usual : *others[form]).run({group})[0]; },
-        [&] {
-            return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        }};
-    const FormChoice chosen = choose_form(forms, names.size(), effort_for(device.info()), may_win);
+    const FormChoice chosen = compare(device, group, frames, may_win);
     for (std::size_t i = 0; i < names.size(); ++i)
         record.times.push_back({group.name, names[i], chosen.ms[i]});
     record.choice[group.name] = names[chosen.form];
+}
+
+// The fastest choice of a group that a record has beside the one that it chose; "": there is none.
+std::string second_choice(const TuningRecord& record, const std::string& group) {
+    const TuningTime* best = nullptr;
+    for (const TuningTime& time : record.times)
+        if (time.group == group && time.choice != record.choice.at(group) &&
+            may_be_chosen(time.choice) && (!best || time.ms < best->ms))
+            best = &time;
+    return best ? best->choice : "";
 }
 
 }  // namespace
@@ -193,12 +211,24 @@ double exp_error(Device& device) {
 }
 
 TuningFrame::TuningFrame(Device& device)
-    : splats_(device, tuning_scene(size_for(device.info())), false),
-      buffers_(device, tuning_options()),
-      forward_(device, tuning_options()),
-      backward_(device, tuning_options()),
-      view_{camera_data(tuning_camera(size_for(device.info())), splats_.origin())},
-      loss_(device, size_for(device.info()).width, size_for(device.info()).height,
+    : TuningFrame(device, std::make_unique<GpuSplats>(device, tuning_scene(size_for(device.info())),
+                                                      false)) {}
+
+TuningFrame::TuningFrame(Device& device, std::unique_ptr<GpuSplats> made)
+    : TuningFrame(
+          device,
+          TimedFrame{*made, camera_data(tuning_camera(size_for(device.info())), made->origin()), 0,
+                     tuning_options()}) {
+    made_ = std::move(made);
+}
+
+TuningFrame::TuningFrame(Device& device, const TimedFrame& frame)
+    : splats_(frame.splats),
+      buffers_(device, frame.options),
+      forward_(device, frame.options),
+      backward_(device, frame.options),
+      view_{.camera = frame.camera, .sh_degree = frame.sh_degree},
+      loss_(device, static_cast<int>(frame.camera.width), static_cast<int>(frame.camera.height),
             {.use_alpha = false}),
       cameras_(upload_cameras(device, {view_.camera})),
       photo_(device, "photo", std::uint64_t{view_.camera.width} * view_.camera.height * 4),
@@ -253,6 +283,30 @@ TuningRecord measure_tuning(Device& device, std::string_view group, double exp_t
     return record;
 }
 
+TuningRecord look_again(Device& device, TuningRecord record, TimedFrame frame) {
+    const ScopeGuard put_back([&, before = device.tuning()] {
+        device.set_tuning(before);
+        device.forget_peak();
+    });
+    frame.options.camera_gradient = frame.options.alpha_gradient = frame.options.depth_sum = false;
+    record.seen_in_a_run = true;
+    const std::unique_ptr<TuningFrame> chosen = frame_by(device, record.choice, &frame);
+    if (!chosen) return record;
+    TuningNames choice = record.choice;
+    for (const TuningGroup& group : measured_groups(device.info())) {
+        const std::string other =
+            record.choice.contains(group.name) ? second_choice(record, group.name) : std::string();
+        if (other.empty()) continue;
+        TuningNames changed = record.choice;
+        changed[group.name] = other;
+        const std::unique_ptr<TuningFrame> second = frame_by(device, changed, &frame);
+        if (second && compare(device, group, {chosen.get(), second.get()}).form == 1)
+            choice[group.name] = other;
+    }
+    record.choice = std::move(choice);
+    return record;
+}
+
 std::optional<TuningRecord> read_tuning(const DeviceInfo& info,
                                         const std::filesystem::path& folder) try {
     std::error_code error;
@@ -266,6 +320,7 @@ std::optional<TuningRecord> read_tuning(const DeviceInfo& info,
         if (!json.contains(name) || dumped(json[name]) != dumped(value)) return std::nullopt;
     TuningRecord record;
     record.choice = parse_tuning(info, json.at("choice").get<std::string>(), "tuning");
+    record.seen_in_a_run = json.value("seen_in_a_run", false);
     for (const nlohmann::json& time : json.at("times"))
         record.times.push_back({time.at("group").get<std::string>(),
                                 time.at("way").get<std::string>(), time.at("ms").get<double>()});
@@ -280,6 +335,7 @@ void write_tuning(const DeviceInfo& info, const std::filesystem::path& folder,
     nlohmann::json json = key_of(info);
     json["shaders"] = shader_hash();
     json["choice"] = names_text(record.choice);
+    json["seen_in_a_run"] = record.seen_in_a_run;
     json["times"] = nlohmann::json::array();
     for (const TuningTime& time : record.times)
         json["times"].push_back({{"group", time.group}, {"way", time.choice}, {"ms", time.ms}});

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -29,20 +30,35 @@ struct TuningTime {
 struct TuningRecord {
     TuningNames choice;             // of every group that is measured
     std::vector<TuningTime> times;  // of all
+    bool seen_in_a_run = false;     // look_again() has compared forms on the splats of a run
 };
 
-/// One frame of the tuner's scene, forward, loss and backward blend, with the device's tuning at
-/// construction. The same splats at every call; more of them where the device is no CPU.
+/// A frame on which forms are timed: splats on the device, drawn through a camera.
+struct TimedFrame {
+    const GpuSplats& splats;
+    gpu::CameraData camera;
+    int sh_degree = 0;  // of the colours, at most the splats'
+    ForwardOptions options;
+};
+
+/// Forward, loss and backward blend of one frame, by the device's tuning at construction.
 class TuningFrame {
   public:
+    /// Of the tuner's own scene: the same splats at every call, more of them where the device is
+    /// no CPU.
     explicit TuningFrame(Device& device);
+    /// Of splats of the caller's, which must outlive it.
+    TuningFrame(Device& device, const TimedFrame& frame);
 
     /// Of each group the milliseconds of its passes together; of the whole frame where the device
     /// has no timestamps. The first call compiles.
     std::vector<double> run(const std::vector<TuningGroup>& groups);
 
   private:
-    GpuSplats splats_;
+    TuningFrame(Device& device, std::unique_ptr<GpuSplats> made);
+
+    std::unique_ptr<GpuSplats> made_;  // null: the caller's
+    const GpuSplats& splats_;
     FrameBuffers buffers_;
     Forward forward_;
     BlendBackward backward_;
@@ -70,6 +86,12 @@ constexpr double kExpTolerance = 3e-6;
 /// before. group: that one alone; empty: all.
 TuningRecord measure_tuning(Device& device, std::string_view group = {},
                             double exp_tolerance = kExpTolerance);
+
+/// A second look at a record, on a frame of a run: in each group the record's choice is compared
+/// with the fastest other one, and the other takes its place where it wins as choose_form finds
+/// it. The record that it returns is seen_in_a_run. The device's tuning and its peak of memory are
+/// afterwards as before; the frame's gradients beyond those of its colours are left out.
+TuningRecord look_again(Device& device, TuningRecord record, TimedFrame frame);
 
 /// The record of this device in the folder of the pipeline cache; nothing where there is none, or
 /// it cannot be read, or it is of another device, driver, subgroup size or set of shaders.

@@ -6,7 +6,9 @@
 #include <filesystem>
 
 #include "engine/core/rng.h"
+#include "engine/plan/tuner.h"
 #include "tests/support/scoped_variants.h"
+#include "tests/support/test_device_options.h"
 #include "tests/support/test_walk.h"
 #include "tests/support/tiny_training.h"
 #include "trainer/run/run.h"
@@ -50,6 +52,44 @@ TEST(TuningWalk, ways_change_bits_only_where_the_table_says_so) {
                 EXPECT_EQ(walk.d, usual.d);
             }
         }
+}
+
+// The record names the slower of two forms. A run corrects it for later runs and keeps its own.
+TEST(TuningWalk, a_run_looks_again_at_the_record_and_keeps_its_own_bits) {
+    const fs::path folder = fs::path(testing::TempDir()) / fmt::format("darb_look_{}", ::getpid());
+    fs::create_directories(folder / "cache");
+    DeviceOptions of_device = device_options();
+    of_device.cache_folder = folder / "cache";
+    Device device(of_device);
+    TuningRecord record;
+    const std::vector<TuningTime> measured = measure_tuning(device, "loss").times;
+    ASSERT_EQ(measured.size(), 2U);
+    const bool strips_win = measured[0].ms < measured[1].ms;
+    const std::string slow = measured[strips_win ? 1 : 0].choice,
+                      fast = measured[strips_win ? 0 : 1].choice;
+    record.choice = {{"loss", slow}};
+    record.times = {{"loss", slow, 1}, {"loss", fast, 2}};
+    write_tuning(device.info(), device.cache_folder(), record);
+
+    TinyTraining t = tiny_training({.width = 200, .height = 150});
+    t.options.iterations = 201;
+    const auto run = [&](const char* name, bool look) {
+        RunOptions options;
+        options.output = folder / name;
+        options.quiet = true;
+        options.report = false;
+        options.look_again = look;
+        run_training(device, t.dataset, t.options, options, nullptr, t.photos);
+        return read_checkpoint(options.output / "checkpoint.darb").state.model.position;
+    };
+    const auto without = run("without", false);
+    EXPECT_FALSE(read_tuning(device.info(), device.cache_folder())->seen_in_a_run);
+    EXPECT_EQ(run("with", true), without);
+    const auto seen = read_tuning(device.info(), device.cache_folder());
+    ASSERT_TRUE(seen);
+    EXPECT_TRUE(seen->seen_in_a_run);
+    EXPECT_EQ(seen->choice.at("loss"), fast) << measured[0].ms << " and " << measured[1].ms;
+    fs::remove_all(folder);
 }
 
 TEST(TuningWalk, a_run_goes_on_in_the_way_that_it_began) {

@@ -1,4 +1,5 @@
 #include "trainer/job/job.h"
+#include "engine/plan/tuning_names.h"
 
 #include <fmt/format.h>
 
@@ -158,6 +159,7 @@ RunOptions run_options(const TrainJob& job, const JobSinks& sinks) {
 
 TrainResult run(Device& device, TrainJob& job, const JobSinks& sinks) {
     RunOptions run = run_options(job, sinks);
+    run.look_again = !is_known_device(device.info());
     if (job.start)
         run.write_start = [start = std::move(*job.start)](const std::filesystem::path& to) mutable {
             write_dense_start(start, to);

@@ -13,6 +13,7 @@
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/run_events.h"
+#include "engine/plan/tuner.h"
 #include "engine/plan/tuning_names.h"
 #include "engine/raster/frame_view.h"
 #include "engine/scene/edit_splats.h"
@@ -31,6 +32,9 @@ namespace darb {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// Iterations until the splats are like those of a trained scene, and the card is warm.
+constexpr int kLooksAgainAt = 200;
 
 // Whether the list has an iteration of (begin, end].
 bool contains(const std::vector<int>& list, int begin, int end) {
@@ -104,6 +108,7 @@ class Run {
     void report_resolution();
     void report_memory();
     void report_probes();
+    void look_at_forms();
     void report_cameras();
     double seconds() const {
         return seconds_ +
@@ -133,6 +138,7 @@ class Run {
     std::uint32_t told_by_memory_ = 0,
                   told_by_intersections_ = 0;  // the splats at which growth stopped
     bool told_no_mean_ = false;
+    bool looked_at_forms_ = false;
     int told_divisor_ = 1;
     bool whole_ = false;  // between two iterations, when the splats can be saved
     double seconds_ = 0;
@@ -383,6 +389,9 @@ void Run::after_step(int begin) {
     report_memory();
     report_probes();
     const int i = trainer_.iteration();
+    if (run_.look_again && !run_.ranks.all && i >= kLooksAgainAt &&
+        trainer_.resolution_divisor() == 1 && !std::exchange(looked_at_forms_, true))
+        look_at_forms();
     const bool last = i == options_.iterations;
     if (last || contains(run_.test_iterations, begin, i)) evaluate(i);
     if (last || contains(run_.save_iterations, begin, i)) save_model(i);
@@ -391,6 +400,31 @@ void Run::after_step(int begin) {
     if (last || (run_.checkpoint_interval > 0 &&
                  i / run_.checkpoint_interval != begin / run_.checkpoint_interval))
         save_checkpoint(run_.output / "checkpoint.darb");
+}
+
+// By the first training view, at its full size.
+void Run::look_at_forms() {
+    const std::optional<TuningRecord> record = read_tuning(device_.info(), device_.cache_folder());
+    if (!record || record->seen_in_a_run) return;
+    const auto trains = [](const View& view) { return !view.is_test; };
+    const auto view = std::find_if(dataset_.views.begin(), dataset_.views.end(), trains);
+    if (view == dataset_.views.end()) return;
+    stopwatch(false);
+    trainer_.drain();
+    try {
+        const TuningRecord seen =
+            look_again(device_, *record,
+                       {trainer_.splats(), camera_data(view->camera, trainer_.splats().origin()),
+                        trainer_.sh_degree(), forward_options(options_)});
+        write_tuning(device_.info(), device_.cache_folder(), seen);
+        if (seen.choice != record->choice)
+            progress_.note(
+                fmt::format("on the splats of this run other passes are faster: {}; they "
+                            "are kept for the runs that follow",
+                            names_text(seen.choice)));
+    } catch (const NoRoom&) {  // a run that leaves no room for it is no place to measure
+    }
+    stopwatch(true);
 }
 
 void Run::report_resolution() {

@@ -41,6 +41,10 @@ struct RunOptions {
     std::filesystem::path resume_from;  // empty: start afresh
     bool quiet = false;
     bool report = true;  // report.html at the end
+    /// Whether the tuner looks at its record of the device once more, on the splats of this run,
+    /// where no run has done so: look_again(). What it finds is for later runs, so that the bits of
+    /// this one do not depend on it.
+    bool look_again = false;
     /// May be empty. Returns the seconds that it held the run up on purpose (a pause), which are
     /// no training time.
     std::function<double(const LiveStep&)> on_step;

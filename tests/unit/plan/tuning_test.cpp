@@ -309,6 +309,15 @@ TEST_F(Tuner, a_record_is_read_back) {
     EXPECT_EQ(read->times[1].ms, 1.25);
 }
 
+TEST_F(Tuner, a_record_says_whether_a_run_has_looked_at_it) {
+    TuningRecord seen = record();
+    write_tuning(some_gpu(), folder_, seen);
+    EXPECT_FALSE(read_tuning(some_gpu(), folder_)->seen_in_a_run);
+    seen.seen_in_a_run = true;
+    write_tuning(some_gpu(), folder_, seen);
+    EXPECT_TRUE(read_tuning(some_gpu(), folder_)->seen_in_a_run);
+}
+
 TEST_F(Tuner, a_record_of_another_device_is_none) {
     write_tuning(some_gpu(), folder_, record());
     const std::string text = read_text_file(only_file());
