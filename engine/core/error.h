@@ -89,7 +89,7 @@ decltype(auto) while_doing(const std::string& what, Work&& work) {
     } catch (const std::bad_alloc&) {
         throw NoRoom(what, "no memory is left", kLess);
     } catch (const std::length_error&) {  // more than a container can ever hold
-        throw NoRoom(what, "no memory has room for so much", kLess);
+        throw NoRoom(what, "more memory is needed than any machine has", kLess);
     } catch (const std::system_error& e) {
         if (e.code() != std::errc::resource_unavailable_try_again) throw;
         throw Error(what, "no thread can be started: " + e.code().message(),

@@ -68,7 +68,7 @@ Container read_whole(const std::filesystem::path& path, size_t most = kAll) try 
     content.resize(used);
     return content;
 } catch (const std::bad_alloc&) {
-    throw NoRoom(path.string(), "is larger than the memory that is free",
+    throw NoRoom(path.string(), "is larger than the free memory",
                  "Free memory, or name a smaller file.");
 }
 

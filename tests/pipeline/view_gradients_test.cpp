@@ -180,7 +180,7 @@ TEST(ViewGradients, errors_of_the_caller_are_thrown) {
     with_nan.at(3, 2, 1) = nan;
     EXPECT_TRUE(refuses([&] { renderer.backward(with_nan); }, "(3, 2), channel 1"));
     EXPECT_NO_THROW(renderer.backward(good)) << "an error leaves the picture";
-    EXPECT_TRUE(refuses([&] { renderer.update(random_scene({.count = 6}).model); }, "other"));
+    EXPECT_TRUE(refuses([&] { renderer.update(random_scene({.count = 6}).model); }, "differs"));
 }
 
 TEST(ViewGradients, a_step_of_rates_that_are_no_numbers_is_refused) {

@@ -119,7 +119,7 @@ BlendFrame download_frame(const ForwardOptions& options, const Frame& frame, con
     if (k.form != KERNEL_FORM_GAUSSIAN || options.evaluation == EVALUATION_BUILTIN ||
         options.storage != STORAGE_FLOAT32 || options.depth_order == DEPTH_ORDER_PIXEL ||
         k.degree >= static_cast<int>(f.polynomial.size()))
-        throw Error("native blending", "knows Gaussian splats in float32 alone",
+        throw Error("native blending", "supports only Gaussian splats in float32",
                     "Measure a scene of the Gaussian kernel at the default accuracy.");
     for (std::size_t i = 0; i < f.polynomial.size(); ++i)
         f.polynomial[i] = static_cast<float>(k.c[i]);

@@ -162,7 +162,7 @@ std::vector<size_t> views_of(const Dataset& dataset, bool test) {
     if (views.empty())
         throw Error(dataset.root.string(),
                     test ? "holds out no photo to measure on" : "has no photo to train on",
-                    "Use a data set of two photos or more.");
+                    "Use a data set with at least two photos.");
     return views;
 }
 

@@ -77,10 +77,11 @@ Study1dResult study_1d(const Study1dOptions& options,
                "{} seeds", options.seeds);
     for (const int k : options.kernels)
         if (!Terms1d::draws(k))
-            throw Error(fmt::format("kernel {}", kernel_1d_name(k)),
-                        "has several pulses, or falls to its edge as no whole power up to the "
-                        "fourth, which this study does not draw",
-                        "Leave it out.");
+            throw Error(
+                fmt::format("kernel {}", kernel_1d_name(k)),
+                "has several pulses, or falls to its edge other than by a whole power up to the "
+                "fourth, which this study does not draw",
+                "Leave it out.");
     const auto start = std::chrono::steady_clock::now();
     Study1dResult result{options, {}, {}, 0};
     std::vector<std::vector<float>> targets;

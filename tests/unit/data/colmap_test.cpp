@@ -329,8 +329,9 @@ TEST(ColmapProject, remedies_that_errors_name_work_as_typed) {
     std::fill(depth.data.begin(), depth.data.end(), 1.0f);
     write_depth_png(folder / "depths/first.png", depth, kMillimetre);
     error = error_of([&] { load_dataset(folder); });
-    EXPECT_NE(error.find("Name it as its photo in " + (folder / "images").string() + ", with .png"),
-              std::string::npos);
+    EXPECT_NE(
+        error.find("Name it like its photo in " + (folder / "images").string() + ", with .png"),
+        std::string::npos);
     std::filesystem::rename(folder / "depths/first.png", folder / "depths/a.png");
     error = error_of([&] { load_dataset(folder); });  // one track does not tell the scale
     EXPECT_NE(error.find("--depth-scale"), std::string::npos) << error;
@@ -442,7 +443,7 @@ TEST(ColmapProject, frames_and_rigs_say_the_poses_as_in_colmap) {
     write(false, right, true);
     write_file_atomic(folder / "sparse/0/frames.txt",
                       std::string("9 7 1 0 0 0 0 0 3 2 CAMERA 1 1 CAMERA 1 2\n"));
-    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("is of camera 2, but of camera 1"),
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("has camera 2, but camera 1"),
               std::string::npos);
     write_file_atomic(folder / "sparse/0/frames.txt",
                       std::string("9 8 1 0 0 0 0 0 3 2 CAMERA 1 1 CAMERA 2 2\n"));

@@ -283,7 +283,7 @@ TEST(Depths, without_a_photo_or_of_another_shape_are_refused) {
     const fs::path set = write_set(false);
     write_depth_png(set / "depths/c.png", ramp(8, 6), kMillimetre);
     std::string error = error_of([&] { load_dataset(set); });
-    EXPECT_NE(error.find("c.png: is the depth of no photo"), std::string::npos) << error;
+    EXPECT_NE(error.find("c.png: belongs to no photo"), std::string::npos) << error;
     write_png(set / "images/c.png", ImageU8(8, 6, 3));  // a photo that is no view
     const Dataset dataset = load_dataset(set);
     View view = dataset.views[0];

@@ -144,8 +144,9 @@ TEST(SplatFile, a_row_of_the_table_answers_everywhere) {
             parse_splats(text, "none");
         });
         EXPECT_NE(refused.find(format_name(format)), std::string::npos) << refused;
-        if (error_of([&] { encode_scene(format, model, "none"); }).find("read and not written") !=
-            std::string::npos)
+        if (error_of([&] {
+                encode_scene(format, model, "none");
+            }).find("can be read, but not written") != std::string::npos)
             continue;
         for (const std::string& ending : endings_of(format)) {
             const std::string name = ending.starts_with('.') ? "scene" + ending : ending;

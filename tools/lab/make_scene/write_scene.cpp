@@ -48,7 +48,7 @@ void refuse_other_photos(const std::filesystem::path& images, const std::vector<
         if (std::none_of(views.begin(), views.end(), [&](const View& view) {
                 return view.name == entry.path().filename().string();
             }))
-            throw Error(entry.path().string(), "is none of the photos that are made here",
+            throw Error(entry.path().string(), "is not one of the photos that are made here",
                         "Name an empty folder.");
 }
 
