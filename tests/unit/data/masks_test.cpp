@@ -1,4 +1,4 @@
-// Masks beside the photos of COLMAP models and transforms files, by every name they go by.
+// Masks beside the photos of COLMAP models and transforms files, under every name that is used.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A set of photos left/a.JPG (a PNG on disk) and b.png, a COLMAP model of it or a transforms file.
+/// Photos left/a.JPG (a PNG on disk) and b.png, with a COLMAP model or a transforms file.
 fs::path write_masked_set(bool colmap) {
     const fs::path folder = test_folder();
     std::vector<View> views(2);

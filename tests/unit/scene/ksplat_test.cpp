@@ -1,4 +1,4 @@
-// .ksplat: files put together by hand at each compression level.
+// .ksplat: files built by hand at each compression level.
 #include <fmt/format.h>
 
 #include <array>
