@@ -1,6 +1,7 @@
 #include "engine/data/colmap.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>

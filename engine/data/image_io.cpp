@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <png.h>
 #include <stb/stb_image_write.h>
+
 #include <algorithm>
 #include <array>
 #include <csetjmp>

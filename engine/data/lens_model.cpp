@@ -1,6 +1,7 @@
 #include "engine/data/lens_model.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>

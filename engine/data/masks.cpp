@@ -1,6 +1,7 @@
 #include "engine/data/masks.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 #include <map>

@@ -1,6 +1,7 @@
 #include "engine/data/point_cloud_ply.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nanoflann.hpp>

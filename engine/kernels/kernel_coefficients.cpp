@@ -1,6 +1,7 @@
 #include "engine/kernels/kernel_coefficients.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>

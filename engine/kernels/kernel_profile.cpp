@@ -1,6 +1,7 @@
 #include "engine/kernels/kernel_profile.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,6 +1,7 @@
 #include "engine/kernels/shaped_kernel.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,6 +1,7 @@
 #include "engine/reference/comparison.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>

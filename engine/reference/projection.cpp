@@ -1,6 +1,7 @@
 #include "engine/reference/projection.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 

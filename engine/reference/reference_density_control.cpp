@@ -1,6 +1,7 @@
 #include "engine/reference/reference_density_control.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>

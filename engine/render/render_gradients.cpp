@@ -1,6 +1,7 @@
 #include "engine/render/render_gradients.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>

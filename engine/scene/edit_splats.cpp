@@ -1,6 +1,7 @@
 #include "engine/scene/edit_splats.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>

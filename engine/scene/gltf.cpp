@@ -1,6 +1,7 @@
 #include "engine/scene/gltf.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/gtc/quaternion.hpp>
+
 #include <limits>
 #include <nanoflann.hpp>
 #include <numbers>

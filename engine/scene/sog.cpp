@@ -4,6 +4,7 @@
 #include <webp/decode.h>
 #include <webp/encode.h>
 #include <zip.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,6 +1,7 @@
 #include "engine/scene/splat_file.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <new>

@@ -1,6 +1,7 @@
 #include "engine/scene/spz.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>

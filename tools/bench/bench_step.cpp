@@ -1,6 +1,7 @@
 #include "tools/bench/bench_step.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 

@@ -1,6 +1,7 @@
 #include "tools/bench/growth.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>

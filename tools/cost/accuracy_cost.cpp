@@ -1,6 +1,7 @@
 #include "tools/cost/accuracy_cost.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -1,6 +1,7 @@
 #include "tools/cost/train_cost.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -2,6 +2,7 @@
 #include "tools/paper/compare_report.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>

@@ -1,6 +1,7 @@
 #include "tools/paper/compare_runs.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>

@@ -1,6 +1,7 @@
 #include "tools/paper/study1d.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
