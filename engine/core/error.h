@@ -1,6 +1,7 @@
 // Error: bad input, or a device that cannot go on. It may be thrown anywhere and is caught once, in
 // main, which prints "error: WHERE: WHAT" and "  WHAT TO DO" and exits with status 2. Code that has
-// a fallback catches one of the narrower kinds below instead.
+// a fallback catches one of the narrower kinds below instead. Also here: DARB_CHECK, for bugs, and
+// while_doing(), which turns the system's refusals into an Error.
 #pragma once
 
 #include <fmt/format.h>
@@ -89,7 +90,7 @@ decltype(auto) while_doing(const std::string& what, Work&& work) {
     } catch (const std::bad_alloc&) {
         throw NoRoom(what, "no memory is left", kLess);
     } catch (const std::length_error&) {  // more than a container can ever hold
-        throw NoRoom(what, "no memory has room for so much", kLess);
+        throw NoRoom(what, "more memory is needed than any machine has", kLess);
     } catch (const std::system_error& e) {
         if (e.code() != std::errc::resource_unavailable_try_again) throw;
         throw Error(what, "no thread can be started: " + e.code().message(),

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
@@ -68,7 +69,7 @@ Container read_whole(const std::filesystem::path& path, size_t most = kAll) try 
     content.resize(used);
     return content;
 } catch (const std::bad_alloc&) {
-    throw NoRoom(path.string(), "is larger than the memory that is free",
+    throw NoRoom(path.string(), "is larger than the free memory",
                  "Free memory, or name a smaller file.");
 }
 

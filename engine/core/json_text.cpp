@@ -25,7 +25,7 @@ std::string shown_at(std::string_view text, std::size_t at) {
 std::string json_fault(std::string_view text, const nlohmann::json::parse_error& error) {
     if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) return "is empty";
     if (text.size() > 1 && (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")))
-        return "is text in UTF-16, and JSON is read in UTF-8";
+        return "is text in UTF-16, but JSON is read in UTF-8";
     // The library counts bytes from 1 and points at the last byte it read.
     const std::size_t at = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
     const std::string_view before = text.substr(0, at);

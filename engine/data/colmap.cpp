@@ -1,6 +1,7 @@
 #include "engine/data/colmap.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -522,14 +523,14 @@ void pose_by_rigs(const ColmapRigs& rigs, const std::vector<ColmapFrame>& frames
         const std::uint32_t camera = frame.images.at(image.id);
         if (camera != image.camera_id)
             throw Error(where,
-                        fmt::format("is of camera {}, but of camera {} in frame {}",
-                                    image.camera_id, camera, frame.id),
+                        fmt::format("has camera {}, but camera {} in frame {}", image.camera_id,
+                                    camera, frame.id),
                         "The files belong to different models: copy all of one model.");
         const auto rig = rigs.find(frame.rig);
         if (rig == rigs.end() || !rig->second.contains(camera))
             throw Error(where,
-                        fmt::format("its frame {} is of rig {}, which has no camera {}", frame.id,
-                                    frame.rig, camera),
+                        fmt::format("its frame {} belongs to rig {}, which has no camera {}",
+                                    frame.id, frame.rig, camera),
                         "The files belong to different models: copy all of one model.");
         const std::optional<ColmapPose>& sensor = rig->second.at(camera);
         if (!sensor) continue;  // not calibrated: only the image's own pose is known

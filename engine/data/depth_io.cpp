@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <zlib.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -43,9 +44,10 @@ float first_channel(const ImageF& image, std::size_t pixel) {
 
 DepthRange write_depth_png(const std::filesystem::path& path, const ImageF& depth, double unit) {
     if (!(unit > 0) || depth.channels < 1)
-        throw Error(path.string(),
-                    fmt::format("depths of {} channels in units of {}", depth.channels, unit),
-                    "Use a unit above 0 and at least one channel.");
+        throw Error(
+            path.string(),
+            fmt::format("cannot write depths of {} channels in units of {}", depth.channels, unit),
+            "Use a unit above 0 and at least one channel.");
     DepthRange range;
     std::string rows;
     for (int y = 0; y < depth.height; ++y) {
@@ -135,7 +137,7 @@ NpyHead npy_head(ByteReader& reader, const std::string& where) {
     std::string header(length, '\0');
     for (char& c : header) c = reader.read<char>();
     if (entry_of(header, "fortran_order", ',', where) != "False")
-        throw Error(where, "is in Fortran's order", "Save numpy.ascontiguousarray of it.");
+        throw Error(where, "is in Fortran order", "Save numpy.ascontiguousarray of it.");
     NpyHead head{.type = entry_of(header, "descr", ',', where)};
     std::vector<std::size_t> shape;
     std::string sizes = entry_of(header, "shape", ')', where);
@@ -305,11 +307,11 @@ TiffLayout tiff_layout(const TiffFile& tiff, std::size_t file_bytes, const std::
     in.predictor = tiff.field(317, 1);
     const bool integer = (format == 1 || format == 2) && (bits == 16 || bits == 32);
     if (tiff.field(277, 1) != 1 || !(integer || (in.floats && (bits == 32 || bits == 64))))
-        tiff.refuse(fmt::format("is a TIFF of {} channels of {} bits, sample format {}",
+        tiff.refuse(fmt::format("is a TIFF with {} channels of {} bits and sample format {}",
                                 tiff.field(277, 1), bits, format));
-    if (tiff.field(274, 1) != 1) tiff.refuse("is a TIFF that is to be turned");
+    if (tiff.field(274, 1) != 1) tiff.refuse("is a TIFF with an orientation, which is not applied");
     if (in.predictor < 1 || in.predictor > 3 || (in.predictor == 3 && !in.floats))
-        tiff.refuse(fmt::format("is a TIFF of predictor {}", in.predictor));
+        tiff.refuse(fmt::format("is a TIFF with predictor {}", in.predictor));
     constexpr std::uint64_t kMostPacked =
         4096;  // bytes that one byte of LZW or deflate can expand to
     if (in.width > INT32_MAX || in.height > INT32_MAX) in.width = 0;
@@ -345,7 +347,7 @@ std::vector<std::byte> tiff_samples(const TiffFile& tiff, const TiffLayout& in,
         raw = unpack_bits(packed, size);
     } else {
         tiff.refuse(
-            fmt::format("is a TIFF compressed by method {}; none, LZW, deflate and PackBits "
+            fmt::format("is a TIFF with compression {}; none, LZW, deflate and PackBits "
                         "are read",
                         in.compression));
     }

@@ -121,8 +121,8 @@ void check_depths(const fs::path& depths, const fs::path& images, const Dataset&
                 stem = name.substr(0, name.size() - word.size());
         if (known.contains(stem) || !find_photo(images, stem.string()).empty()) continue;
         throw Error(
-            file.string(), "is the depth of no photo",
-            fmt::format("Name it as its photo in {}, with .png, .tif or .npy, or remove it.",
+            file.string(), "belongs to no photo",
+            fmt::format("Name it like its photo in {}, with .png, .tif or .npy, or remove it.",
                         images.string()));
     }
 }

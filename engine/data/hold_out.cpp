@@ -37,7 +37,7 @@ glm::dvec3 row(const glm::dmat3& m, int r) {
 
 [[noreturn]] void refuse(std::string_view text, std::string_view word) {
     throw Error(fmt::format("--hold-out {}", text),
-                fmt::format("'{}' is neither every:N nor arc:N with N from 2", word),
+                fmt::format("'{}' is neither every:N nor arc:N with N of at least 2", word),
                 "Use every:8, arc:8, or both: every:8,arc:8.");
 }
 

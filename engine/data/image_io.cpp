@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <png.h>
 #include <stb/stb_image_write.h>
+
 #include <algorithm>
 #include <array>
 #include <csetjmp>
@@ -47,10 +48,10 @@ PhotoHead photo_head(std::span<const std::byte> head, std::uint64_t bytes,
 
 void check_picture(const ImageU8& image) {
     if (image.width <= 0 || image.height <= 0 || image.channels < 1)
-        throw Error(
-            "picture",
-            fmt::format("{}x{}x{} is nothing to write", image.width, image.height, image.channels),
-            "Give it a width, a height and channels.");
+        throw Error("picture",
+                    fmt::format("a picture of {}x{}x{} cannot be written", image.width,
+                                image.height, image.channels),
+                    "Give it a width, a height and channels.");
 }
 
 /// Called by stb_image_write with each piece of a file.
@@ -119,7 +120,7 @@ ImageU8 read_image(const std::filesystem::path& path, int orientation) {
 
 ImageU8 orient_image(const ImageU8& image, int orientation) {
     if (orientation < 1 || orientation > 8)
-        throw Error("picture", fmt::format("no orientation {}", orientation),
+        throw Error("picture", fmt::format("there is no orientation {}", orientation),
                     "Exif counts them from 1 to 8.");
     if (orientation == 1) return image;
     const bool swap = orientation >= 5;

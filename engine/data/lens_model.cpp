@@ -1,6 +1,7 @@
 #include "engine/data/lens_model.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -56,10 +57,10 @@ const ModelRow* find_model(std::string_view name) {
 const ModelRow& model_of(const LensModel& lens) {
     const ModelRow* row = find_model(lens.model);
     if (!row || static_cast<int>(lens.parameters.size()) != row->parameters)
-        throw Error(
-            "lens",
-            fmt::format("{} with {} parameters is no model", lens.model, lens.parameters.size()),
-            "check_lens tells what is wrong with it.");
+        throw Error("lens",
+                    fmt::format("there is no model {} with {} parameters", lens.model,
+                                lens.parameters.size()),
+                    "check_lens tells what is wrong with it.");
     return *row;
 }
 
@@ -127,7 +128,8 @@ LensModel scale_lens(const LensModel& lens, int width, int height) {
     if (width == lens.width && height == lens.height) return lens;
     const ModelRow& row = model_of(lens);
     if (lens.width <= 0 || lens.height <= 0)
-        throw Error("lens " + lens.model, fmt::format("is of {}x{} px", lens.width, lens.height),
+        throw Error("lens " + lens.model,
+                    fmt::format("has a size of {}x{} px", lens.width, lens.height),
                     "Name the size of its photo.");
     const double sx = static_cast<double>(width) / lens.width;
     const double sy = static_cast<double>(height) / lens.height;

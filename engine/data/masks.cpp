@@ -1,6 +1,7 @@
 #include "engine/data/masks.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 #include <map>
@@ -130,9 +131,11 @@ void add_masks(const fs::path& folder, const DatasetOptions& options, Dataset& d
     for (const View& view : dataset.views) without += view.mask.empty() ? 1 : 0;
     if (without == count && options.require_photos) {
         const std::string name = without_images(dataset.views[0].name);
-        throw Error(masks.string(), fmt::format("holds the masks of none of the {} photos", count),
-                    fmt::format("Name them as the photos, as {}.png for {}, or remove the folder.",
-                                without_picture_extension(name).string(), name));
+        throw Error(
+            masks.string(), fmt::format("holds no mask for any of the {} photos", count),
+            fmt::format(
+                "Name masks like their photos, such as {}.png for {}, or remove the folder.",
+                without_picture_extension(name).string(), name));
     }
     if (without > 0)
         dataset.notes.push_back(

@@ -43,8 +43,8 @@ int used_channels(const ImageF& image) {
 void check_same_size(const ImageF& a, const ImageF& b) {
     if (a.width != b.width || a.height != b.height || a.channels != b.channels || a.data.empty())
         throw Error("comparison",
-                    fmt::format("pictures of {}x{}x{} and {}x{}x{}", a.width, a.height, a.channels,
-                                b.width, b.height, b.channels),
+                    fmt::format("the pictures have different sizes, {}x{}x{} and {}x{}x{}", a.width,
+                                a.height, a.channels, b.width, b.height, b.channels),
                     "Compare pictures of one size and number of channels.");
 }
 

@@ -1,6 +1,7 @@
 #include "engine/data/point_cloud_ply.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nanoflann.hpp>
@@ -16,7 +17,7 @@ namespace darb {
 namespace {
 
 constexpr std::uint8_t kMidGrey = 128;
-// Floats are 0 to 1 or, as some writers have it, 0 to 255: any above this says which.
+// Float colours are 0 to 1, but 0 to 255 with some writers: any value above this tells.
 constexpr double kLargestUnitColour = 1.0 + 1.0 / 255;
 
 bool is_float(PlyType type) {
@@ -60,7 +61,8 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeade
             fmt::format("{} is a splat scene: its points have the colours of its f_dc.", where));
     if (notes && uncoloured && !is_scene && vertex->count > 0)
         notes->push_back(fmt::format("{} has no colours: its points are grey.", where));
-    // What a value is multiplied by, to 0 .. 255; floats follow when the largest is known.
+    // What each value is multiplied by to be in [0, 255]; for floats, set once the largest is
+    // known.
     const auto type_of = [&](int i) {
         return vertex->properties[static_cast<std::size_t>(colour[i])].type;
     };

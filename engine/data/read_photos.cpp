@@ -1,5 +1,6 @@
 // Photos: decode, mask, undistort, scale; many at once.
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>

@@ -117,8 +117,8 @@ class MaskValues {
 void apply_mask(ImageU8& rgba, const ImageU8& mask) {
     if (rgba.channels != 4 || mask.width <= 0 || mask.height <= 0)
         throw Error("mask",
-                    fmt::format("{}x{} px for a photo of {} channels", mask.width, mask.height,
-                                rgba.channels),
+                    fmt::format("cannot apply {}x{} px to a photo of {} channels", mask.width,
+                                mask.height, rgba.channels),
                     "Use RGBA photos and masks that are not empty.");
     const MaskValues values(mask);
     for (int y = 0; y < rgba.height; ++y) {
@@ -134,10 +134,10 @@ void apply_mask(ImageU8& rgba, const ImageU8& mask) {
 
 ImageU8 box_downscale(const ImageU8& rgba, int width, int height) {
     if (rgba.channels != 4 || width < 1 || height < 1 || width > rgba.width || height > rgba.height)
-        throw Error(
-            "downscale",
-            fmt::format("{}x{}x{} to {}x{}", rgba.width, rgba.height, rgba.channels, width, height),
-            "Use RGBA, and a size of at least 1 px and at most the photo's.");
+        throw Error("downscale",
+                    fmt::format("cannot turn {}x{}x{} into {}x{}", rgba.width, rgba.height,
+                                rgba.channels, width, height),
+                    "Use RGBA, and a size of at least 1 px and at most the photo's.");
     if (width == rgba.width && height == rgba.height) return rgba;
     const std::vector<Coverage> columns = cover(rgba.width, width);
     const std::vector<Coverage> rows = cover(rgba.height, height);

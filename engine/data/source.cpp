@@ -1,6 +1,7 @@
 #include "engine/data/source.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>

@@ -1,6 +1,7 @@
 #include "engine/data/transforms.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -433,14 +434,15 @@ void read_depth_unit(const json& root, const std::string& where, TransformsFile&
     if (all && integers && *all != *integers)
         throw Error(where,
                     fmt::format("{} is {:g}, but {} is {:g}", kAll, *all, kIntegers, *integers),
-                    "Remove the one that is wrong: both are the metres of a step.");
+                    "Remove the one that is wrong: both state the metres of one step.");
     if (all && !(*all > 0 && *all < 1e6))
         throw Error(where, fmt::format("{} is {}", kAll, *all),
-                    "Give the metres of a step, as 0.001.");
+                    "Give the metres of one step, such as 0.001.");
     if (integers && *integers >= 1)
-        throw Error(where, fmt::format("{} is {:g}, as many metres a step", kIntegers, *integers),
-                    fmt::format("Give the metres of a step: {:g}, if that many steps are a metre.",
-                                1 / *integers));
+        throw Error(
+            where, fmt::format("{} is {:g} metres a step, which is too much", kIntegers, *integers),
+            fmt::format("Give the metres of one step: {:g}, if that many steps make a metre.",
+                        1 / *integers));
     file.unit_of_integers = integers && !all;
     file.depth_unit = all ? *all : integers.value_or(0);
     file.read_depths = read_bool(root, "enable_depth_loading", where, true);
@@ -448,7 +450,7 @@ void read_depth_unit(const json& root, const std::string& where, TransformsFile&
     read_number(root, "applied_scale", where, scale);
     if (scale && !(*scale > 0 && std::isfinite(*scale)))
         throw Error(where, fmt::format("applied_scale is {}", *scale),
-                    "Give what poses were multiplied by, or remove it.");
+                    "Give the factor that poses were multiplied by, or remove it.");
     file.applied_scale = scale.value_or(1);
 }
 

@@ -87,9 +87,9 @@ std::string selection(const std::vector<std::size_t>& pictures) {
     std::string said = "\n" + log.text();
     const auto says = [&](const char* part) { return said.find(part) != std::string::npos; };
     if (says("matches no streams"))
-        throw Error(video.string(), "holds no pictures, as sound alone does", "Name a video.");
+        throw Error(video.string(), "holds no pictures, only sound", "Name a video.");
     const char* hint = says("moov atom not found") || fs::file_size(video) == 0
-                           ? "It is not whole: copy it from the camera again."
+                           ? "It is incomplete: copy it from the camera again."
                            : "Check that it plays; ffmpeg -i shows what it holds.";
     for (std::size_t at = 0; (at = said.find('\n', at)) != std::string::npos; at += 5)
         said.replace(at, 1, "\n    ");

@@ -1,6 +1,7 @@
 #include "engine/kernels/kernel_coefficients.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -205,7 +206,7 @@ KernelCoefficients fit_plain(const DerivedKernel& kernel, Footprint footprint) {
 
 KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree) {
     if (degree < kLeastDegree || degree > kFullDegree)
-        throw Error("kernel", fmt::format("a polynomial of degree {}", degree),
+        throw Error("kernel", fmt::format("there is no polynomial of degree {}", degree),
                     fmt::format("Degrees are {} to {}.", kLeastDegree, kFullDegree));
     if (kernel.row().given && kernel.row().form == KERNEL_FORM_COMPACT)
         return fit_given(kernel, footprint, degree);

@@ -1,6 +1,7 @@
 #include "engine/kernels/kernel_profile.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -96,7 +97,7 @@ const std::array<KernelProfile, KERNEL_ROWS> kRows{{
 const KernelProfile& listed_profile(int kernel) {
     if (kernel < 0 || kernel >= KERNEL_ROWS)
         throw Error(
-            "kernel", fmt::format("{} is the number of none", kernel),
+            "kernel", fmt::format("there is none with the number {}", kernel),
             fmt::format("Kernels are 0 to {}: shaders/shared/kernel_list.h.", KERNEL_ROWS - 1));
     return kRows[static_cast<std::size_t>(kernel)];
 }
@@ -235,7 +236,7 @@ double DerivedKernel::radial_moment(double radius, int power) const {
 void DerivedKernel::footprint_parts(double q, double& u, double& p, double& dp) const {
     if (row_.form == KERNEL_FORM_RINGS)
         throw Error("kernel", fmt::format("{} has no exact footprint", row_.name),
-                    "Kernels of several pulses take the footprint psi.");
+                    "Use the footprint psi for kernels with several pulses.");
     u = (row_.support - q) / row_.support;
     footprint_.evaluate(u, p, dp);
 }
@@ -291,7 +292,8 @@ double DerivedKernel::equal_area_scale(Footprint footprint) const {
 
 double DerivedKernel::radius_quantile(double u) const {
     if (!(u >= 0 && u < 1))
-        throw Error("kernel", fmt::format("{} is no quantile", u), "It is 0 or more, below 1.");
+        throw Error("kernel", fmt::format("{} is not a quantile", u),
+                    "Quantiles are 0 or more, and below 1.");
     const double target = u * radial_mass_;
     double low = 0, high = radius_, r = radius_ * std::cbrt(u) / 2;
     // Newton, kept inside the bracket; the density r^2 w is positive inside the ball.

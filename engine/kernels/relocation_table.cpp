@@ -13,8 +13,9 @@ namespace darb {
 
 double relocation_opacity(double opacity, int count) {
     if (!(opacity >= 0 && opacity <= 1) || count < 1)
-        throw Error("relocation", fmt::format("{} splats of opacity {}", count, opacity),
-                    "It wants at least one, of an opacity between 0 and 1.");
+        throw Error("relocation",
+                    fmt::format("cannot be computed for {} splats of opacity {}", count, opacity),
+                    "Give at least one, with an opacity between 0 and 1.");
     return -std::expm1(std::log1p(-opacity) / count);
 }
 
@@ -42,8 +43,9 @@ double relocation_scale(int kernel, Footprint footprint, double opacity, int cou
 
 std::vector<float> relocation_table(int kernel, Footprint footprint, int opacities, int max_count) {
     if (opacities < 1 || max_count < 1)
-        throw Error("relocation", fmt::format("a table of {} x {}", max_count, opacities),
-                    "It wants at least one row and one column.");
+        throw Error("relocation",
+                    fmt::format("cannot make a table of {} x {}", max_count, opacities),
+                    "Ask for at least one row and one column.");
     std::vector<float> table;
     const ShapedKernel* shaped = kernel_has_shape(kernel) ? &shaped_kernel(kernel) : nullptr;
     for (int row = 0; row < (shaped ? SHAPE_ROWS : 1); ++row) {

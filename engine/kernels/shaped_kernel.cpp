@@ -1,6 +1,7 @@
 #include "engine/kernels/shaped_kernel.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -85,7 +86,7 @@ bool kernel_has_shape(int kernel) {
 const ShapedKernel& shaped_kernel(int kernel) {
     const ShapedKernel* row = find(kernel);
     if (row == nullptr)
-        throw Error("kernel", fmt::format("{} has no shape of each splat", kernel_name(kernel)),
+        throw Error("kernel", fmt::format("{} has no shape per splat", kernel_name(kernel)),
                     "Ask kernel_has_shape first.");
     return *row;
 }

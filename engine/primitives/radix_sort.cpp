@@ -64,7 +64,7 @@ RadixSort::RadixSort(Device& device, std::uint32_t capacity, std::optional<SortS
     : capacity_(capacity),
       scatter_(scatter.value_or(device.tuning().scatter)),
       shape_(choose_shape(device, scatter_, subgroup_size)) {
-    if (capacity == 0) throw Error("sort", "of no pairs", "Make it for at least one.");
+    if (capacity == 0) throw Error("sort", "its capacity is 0 pairs", "Make it for at least one.");
     const std::uint64_t blocks = (std::uint64_t{capacity} + block() - 1) / block();
     if (blocks > device.info().max_groups_x)
         throw NoRoom(
@@ -113,11 +113,12 @@ void RadixSort::record(Commands& commands, const Buffer& keys, const Buffer& val
                        bool iota_values) {
     const std::uint64_t bytes = std::uint64_t{capacity_} * 4;
     if (key_bits < 1 || key_bits > 32)
-        throw Error("sort", fmt::format("keys of {} bits", key_bits), "Use 1 to 32.");
+        throw Error("sort", fmt::format("cannot sort by {} bits of a key", key_bits),
+                    "Use 1 to 32.");
     if (keys.bytes() < bytes || values.bytes() < bytes)
         throw Error("sort",
-                    fmt::format("buffers of {} and {} bytes, a capacity of {} pairs", keys.bytes(),
-                                values.bytes(), capacity_),
+                    fmt::format("buffers of {} and {} bytes do not hold its capacity of {} pairs",
+                                keys.bytes(), values.bytes(), capacity_),
                     "Give it buffers of its capacity.");
     const gpu::RadixPrepareArgs args{capacity_, static_cast<std::uint32_t>(count_offset / 4),
                                      block()};

@@ -45,7 +45,9 @@ SpecConstants apply_constants(const Device& device, const Scan::Strategy& strate
 
 void check_word(const Buffer& buffer, std::uint64_t offset) {
     if (offset % 4 != 0 || offset + 4 > buffer.bytes())
-        throw Error("scan", fmt::format("no word at byte {} of {}", offset, buffer.bytes()),
+        throw Error("scan",
+                    fmt::format("there is no word at byte {} of a buffer of {} bytes", offset,
+                                buffer.bytes()),
                     "Use a multiple of 4 within the buffer.");
 }
 
@@ -72,7 +74,8 @@ Scan::Scan(Device& device, std::uint32_t capacity, const Strategy& strategy)
              strategy.subgroup_size),
       apply_in_place_(device, "scan_apply", apply_constants(device, strategy, true), true,
                       strategy.subgroup_size) {
-    if (capacity == 0) throw Error("scan", "of no elements", "Make it for at least one.");
+    if (capacity == 0)
+        throw Error("scan", "its capacity is 0 elements", "Make it for at least one.");
     if (capacity > max_capacity(device, strategy))
         throw NoRoom(
             "scan",
@@ -102,7 +105,7 @@ void Scan::record(Commands& commands, const Buffer& counts, const Buffer& offset
     const std::uint64_t bytes = std::uint64_t{capacity_} * sizeof(std::uint32_t);
     if (counts.bytes() < bytes || offsets.bytes() < bytes)
         throw Error("scan",
-                    fmt::format("buffers of {} and {} bytes, a capacity of {} words",
+                    fmt::format("buffers of {} and {} bytes do not hold its capacity of {} words",
                                 counts.bytes(), offsets.bytes(), capacity_),
                     "Give it buffers of its capacity.");
     check_word(count_buffer, count_offset);

@@ -36,9 +36,9 @@ std::size_t count_that_fits(std::size_t splats, std::size_t fixed, std::size_t b
     const double count = std::floor(kShareOfRoom * share * static_cast<double>(splats));
     if (count < 1)
         throw Error("--max-size",
-                    fmt::format("{} bytes hold no splats", most) +
+                    fmt::format("{} bytes have no room for splats", most) +
                         (fixed > 0 ? fmt::format(": what comes beside them takes {}", fixed) : ""),
-                    "Give more.");
+                    "Allow more bytes.");
     return static_cast<std::size_t>(count);
 }
 

@@ -1,6 +1,7 @@
 #include "engine/publish/page_document.h"
 
 #include <fmt/format.h>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <regex>

@@ -48,8 +48,8 @@ std::size_t start_of(const std::string& start, const std::vector<View>& views) {
     if (std::from_chars(start.data(), end, number).ptr != end || number < 1 ||
         number > views.size())
         throw Error("--start-camera " + printable(start),
-                    fmt::format("is none of the {} cameras", views.size()),
-                    fmt::format("Give a name, as {}, or a number from 1 to {}.",
+                    fmt::format("is not one of the {} cameras", views.size()),
+                    fmt::format("Give a name, such as {}, or a number from 1 to {}.",
                                 printable(views[0].name), views.size()));
     return number - 1;
 }
@@ -87,7 +87,7 @@ class FittedPage : public PictureOutput {
         const PagePrecision precision = page_precision(level, source_.kernel);
         packed_ = pack_page_splats(splats, precision);
         if (packed_.count == 0)
-            throw Error("web page", "the scene has no splat that is drawn",
+            throw Error("web page", "the scene has no visible splat",
                         "Choose another scene, or another part of it.");
         facts_.splats = packed_.count;
         facts_.exact = precision.exact;
@@ -131,7 +131,7 @@ std::string make_web_page(Device& device, const SplatModel& model, const WebPage
         throw Error("web page", "the scene has no splats", "Choose another scene.");
     if (!model.shape.empty())
         throw Error("web page",
-                    fmt::format("has no place for the shape that each splat of the kernel {} has",
+                    fmt::format("cannot store the shape that each splat of the kernel {} has",
                                 kernel_name(model.kernel)),
                     "Write the nearest Gaussians: darb convert --kernel gaussian.");
     PageDocument document;

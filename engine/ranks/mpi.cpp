@@ -116,7 +116,8 @@ MpiRanks::MpiRanks() {
     MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
     MPI_Comm_size(MPI_COMM_WORLD, &count_);
     if (provided < MPI_THREAD_SERIALIZED)
-        throw Error(mpi_name(), "takes no calls from several threads", "Use another build of MPI.");
+        throw Error(mpi_name(), "does not support calls from several threads",
+                    "Use another build of MPI.");
     MPI_Comm_dup(MPI_COMM_WORLD, &work_);
     MPI_Comm_dup(MPI_COMM_WORLD, &alive_);
     std::vector<char> names(std::size_t(count_) * MPI_MAX_PROCESSOR_NAME, '\0');
@@ -314,7 +315,7 @@ std::unique_ptr<Ranks> start_ranks() {
         throw Error("darb",
                     fmt::format("{} processes were started by another MPI than its own, {}",
                                 launched_ranks(), mpi_name()),
-                    "Start it by the mpirun of that one.");
+                    "Start it with the mpirun that belongs to that one.");
     return ranks;
 }
 

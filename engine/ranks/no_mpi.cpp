@@ -13,7 +13,7 @@ std::string mpi_name() {
 std::unique_ptr<Ranks> start_ranks() {
     if (const int ranks = launched_ranks(); ranks > 1)
         throw Error("darb",
-                    fmt::format("was started {} times over, and is built without MPI", ranks),
+                    fmt::format("was started {} times together, but is built without MPI", ranks),
                     "Build it where MPI is installed (tools/setup.sh --with-mpi), or start it "
                     "without mpirun.");
     return std::make_unique<OneRank>();

@@ -18,7 +18,7 @@ void adam_step(std::span<T> parameter, std::span<const T> gradient, std::span<T>
         throw Error("Adam",
                     fmt::format("{} parameters, {} gradients, moments {} and {}", n,
                                 gradient.size(), moment1.size(), moment2.size()),
-                    "All are of one length.");
+                    "All must have the same length.");
     const double bias1 = 1 - std::pow(settings.beta1, step);
     const double bias2 = 1 - std::pow(settings.beta2, step);
     for (size_t i = 0; i < n; ++i) {

@@ -1,8 +1,9 @@
 #include "engine/reference/comparison.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 
 #include "engine/core/error.h"
@@ -77,8 +78,8 @@ const Tolerance& tolerance(std::string_view name) {
             return row;
         }
     }
-    throw Error("tolerance", fmt::format("none is named {}", name),
-                "The names stand in engine/reference/comparison.cpp.");
+    throw Error("tolerance", fmt::format("there is none named {}", name),
+                "engine/reference/comparison.cpp has the names.");
 }
 
 namespace {
@@ -115,8 +116,9 @@ double error_ratio(double expected, double got, const Tolerance& tolerance) {
 ComparisonStats comparison_stats(std::span<const double> expected, std::span<const double> got,
                                  const Tolerance& tolerance) {
     if (expected.size() != got.size())
-        throw Error("comparison", fmt::format("{} values and {}", expected.size(), got.size()),
-                    "Give as many of both.");
+        throw Error("comparison",
+                    fmt::format("cannot compare {} values with {}", expected.size(), got.size()),
+                    "Pass equal numbers of both.");
     ComparisonStats stats;
     stats.count = expected.size();
     double signed_sum = 0, size_sum = 0;

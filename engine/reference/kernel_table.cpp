@@ -157,8 +157,8 @@ double KernelTable::reach(double opacity, double cutoff, double exponent) const 
 const KernelTable& kernel_table(int kernel, Footprint footprint, int polynomial_degree) {
     static_cast<void>(kernel_profile(kernel));  // throws for ids that do not exist
     if (polynomial_degree < 0 || polynomial_degree > kFullDegree)
-        throw Error("kernel", fmt::format("a polynomial of degree {}", polynomial_degree),
-                    fmt::format("Degrees are 0, for none, to {}.", kFullDegree));
+        throw Error("kernel", fmt::format("there is no polynomial of degree {}", polynomial_degree),
+                    fmt::format("Use 0, for none, or a degree up to {}.", kFullDegree));
     struct Slot {
         std::once_flag once;
         std::unique_ptr<const KernelTable> table;

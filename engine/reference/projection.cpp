@@ -1,6 +1,7 @@
 #include "engine/reference/projection.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -302,7 +303,7 @@ template <class T>
 ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& camera,
                           const RenderSettings& settings, const KernelTable& kernel) {
     if (index >= splats.size())
-        throw Error("reference", fmt::format("splat {} of {}", index, splats.size()),
+        throw Error("reference", fmt::format("there is no splat {} among {}", index, splats.size()),
                     "Splats count from 0.");
     ProjectedSplat<T> p;
     const Vec3<T> mean = mean_in_camera(&splats.position[index * 3], camera);

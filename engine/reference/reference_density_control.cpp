@@ -1,6 +1,7 @@
 #include "engine/reference/reference_density_control.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -55,9 +56,9 @@ std::vector<DensityAction> density_actions(std::span<const double> gradient_sum,
     const std::size_t n = opacity_logit.size();
     if (gradient_sum.size() != n || seen.size() != n || log_scale.size() != n * 3)
         throw Error("density control",
-                    fmt::format("{} splats, {} gradients, {} counts, {} scales", n,
+                    fmt::format("got {} splats, {} gradients, {} counts and {} scales", n,
                                 gradient_sum.size(), seen.size(), log_scale.size()),
-                    "Give one gradient, one count and three scales a splat.");
+                    "Give one gradient, one count and three scales per splat.");
     std::vector<DensityAction> actions(n, DensityAction::keep);
     std::vector<double> gradient(n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -147,7 +148,7 @@ RelocationPlan relocation_plan(std::span<const std::uint32_t> weights, std::uint
                         std::uint64_t{0});
     if (ends.empty() || ends.back() == 0 || ends.back() >= 1ull << 32)
         throw Error("relocation", fmt::format("{} weights", weights.size()),
-                    "Their sum is positive and fits 32 bits.");
+                    "Their sum must be positive and fit 32 bits.");
     const auto dead = static_cast<std::uint32_t>(std::count(weights.begin(), weights.end(), 0u));
     RelocationPlan plan;
     plan.copies.assign(weights.size(), 0);

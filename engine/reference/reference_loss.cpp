@@ -135,8 +135,8 @@ LossResult<T> loss(const Image<T>& image, const Image<T>& truth, const LossSetti
                                 truth.width, truth.height, truth.channels),
                     "Compare RGB pictures of one size.");
     if (!weight.data.empty() && weight.data.size() * 3 != image.data.size())
-        throw Error("loss", fmt::format("{} weights", weight.data.size()),
-                    "Give one a pixel, or none.");
+        throw Error("loss", fmt::format("got {} weights", weight.data.size()),
+                    "Give one per pixel, or none.");
     LossResult<T> result;
     result.d_image = Image<T>(image.width, image.height, 3);
     const double count = static_cast<double>(image.data.size());

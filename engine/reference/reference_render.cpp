@@ -30,11 +30,13 @@ void check_shapes(const Splats<T>& splats, const Camera& camera) {
         const size_t held = attribute_values(splats, a).size();
         if (held != n * attribute_floats(a, splats.sh_degree) &&
             (held != 0 || !kSplatAttributes[static_cast<size_t>(a)].optional))
-            throw Error("splats", fmt::format("{}: {} values for {}", attribute_name(a), held, n),
-                        "Each array holds the values of all, as splat_attributes.h says.");
+            throw Error(
+                "splats",
+                fmt::format("{} holds {} values for {} splats", attribute_name(a), held, n),
+                "Each array holds the values of all splats: see engine/scene/splat_model.h.");
     }
     if (camera.width < 1 || camera.height < 1)
-        throw Error("camera", fmt::format("{} x {} pixels", camera.width, camera.height),
+        throw Error("camera", fmt::format("has {} x {} pixels", camera.width, camera.height),
                     "Give it at least one each way.");
 }
 
@@ -85,14 +87,16 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
     check_shapes(splats, camera);
     if (d_image.width != camera.width || d_image.height != camera.height || d_image.channels != 3 ||
         result.projected.size() != splats.size())
-        throw Error("reference",
-                    fmt::format("a gradient of {}x{}x{} for {}x{}, {} splats for {}", d_image.width,
-                                d_image.height, d_image.channels, camera.width, camera.height,
-                                result.projected.size(), splats.size()),
-                    "Walk back what render() made of the same splats and camera.");
+        throw Error(
+            "reference",
+            fmt::format("got a gradient of {}x{}x{} for a picture of {}x{}, and {} splats for {}",
+                        d_image.width, d_image.height, d_image.channels, camera.width,
+                        camera.height, result.projected.size(), splats.size()),
+            "Pass the result of render() for the same splats and camera.");
     for (const Image<T>* d : {&d_alpha, &d_depth})
         if (!d->data.empty() && (d->width != camera.width || d->height != camera.height))
-            throw Error("reference", fmt::format("a gradient of {}x{}", d->width, d->height),
+            throw Error("reference",
+                        fmt::format("got a gradient of {}x{} pixels", d->width, d->height),
                         "It is of the camera's size, or empty.");
     const KernelTable& kernel =
         kernel_table(splats.kernel, splats.footprint, settings.polynomial_degree);

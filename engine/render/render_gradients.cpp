@@ -1,6 +1,7 @@
 #include "engine/render/render_gradients.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -55,9 +56,10 @@ const SplatModel& checked(const Device& device, const SplatModel& model) {
     check_splat_shapes(model);
     const std::uint32_t most = GpuSplats::max_count(device, model.sh_degree, false);
     if (model.size() > most)
-        throw Error("splat model",
-                    fmt::format("{} splats, this device holds {}", model.size(), most),
-                    "Leave some out, or lower the degree of harmonics.");
+        throw Error(
+            "splat model",
+            fmt::format("has {} splats, but this device holds {} at most", model.size(), most),
+            "Leave some out, or lower the degree of harmonics.");
     return model;
 }
 
@@ -70,22 +72,24 @@ void check_camera(const Camera& camera, const glm::vec3& background) {
         for (int k = 0; k < 3; ++k) finite = finite && std::isfinite(camera.rotation[i][k]);
     }
     if (!finite)
-        throw Error("camera", "a number of it or of the background is not finite",
+        throw Error("camera", "one of its numbers, or of the background's, is not finite",
                     "Check pose, focal lengths and principal point.");
     if (camera.width < 1 || camera.height < 1 || !(camera.fx > 0) || !(camera.fy > 0))
         throw Error("camera",
-                    fmt::format("{} x {} px, focal lengths {} and {}", camera.width, camera.height,
-                                camera.fx, camera.fy),
+                    fmt::format("has {} x {} px and focal lengths of {} and {} px", camera.width,
+                                camera.height, camera.fx, camera.fy),
                     "A picture has pixels and positive focal lengths.");
 }
 
 ForwardOptions options_of(const SplatModel& model, const GradientOptions& asked, bool lens) {
     if (asked.direct_colour && model.sh_degree > 0)
-        throw Error("splat model", fmt::format("harmonics of degree {}", model.sh_degree),
-                    "Colours of their own leave no room for harmonics: give either.");
+        throw Error(
+            "splat model",
+            fmt::format("has harmonics of degree {} beside direct colours", model.sh_degree),
+            "Give either harmonics or direct colours.");
     if (asked.accuracy.value(kRenderScale) < 1)
-        throw Error("gradients", "of a picture that is half as large",
-                    "Render at the size that you want.");
+        throw Error("gradients", "do not exist for a picture that is rendered at half size",
+                    "Render at full size.");
     ForwardOptions options = frame_accuracy(asked.accuracy, model).options;
     options.store_for_backward = true;
     options.effects.lens = lens;
@@ -212,7 +216,7 @@ void GradientRenderer::update(const SplatModel& model) {
     State& s = *state_;
     check_splat_shapes(model);
     if (!s.draws_as(model) || !s.holds_same(model))
-        throw Error("splat model", "is of other splats than the one on the device",
+        throw Error("splat model", "differs from the one on the device in more than its values",
                     "Make another GradientRenderer for it.");
     s.upload(model);
 }
@@ -221,7 +225,8 @@ void GradientRenderer::replace(const SplatModel& model) {
     State& s = *state_;
     checked(s.device, model);
     if (!s.draws_as(model))
-        throw Error("splat model", "is drawn in another way than the one on the device",
+        throw Error("splat model",
+                    "has another kernel, footprint or anti-aliasing than the one on the device",
                     "Make another GradientRenderer for it.");
     options_of(model, s.options, false);
     if (s.holds_same(model)) return s.upload(model);
@@ -273,7 +278,7 @@ std::vector<Source> sources_of(const GpuSplats& splats, const GivenValues& given
         if (const std::size_t wanted = splats.count() * source.floats;
             source.values.size() != wanted)
             throw Error(attribute_name(source.attribute),
-                        fmt::format("{} values, {} splats need {}", source.values.size(),
+                        fmt::format("has {} values, but {} splats need {}", source.values.size(),
                                     splats.count(), wanted),
                         "Give the values of all splats.");
     return sources;

@@ -133,7 +133,7 @@ const Buffer& Renderer::draw(const Camera& camera, const glm::vec3& background, 
                              float near_plane) {
     const Camera rendered = accuracy_.halved ? halved(camera) : camera;
     if (camera.lens.active && !forward_.options().effects.lens)
-        throw Error("render", "the camera has a lens and the effect is off",
+        throw Error("render", "the camera has a lens, but the effect is off",
                     "Turn ProjectionEffects::lens on, or drop the camera's lens.");
     const int degree =
         sh_degree < 0 ? accuracy_.sh_degree : std::min(sh_degree, accuracy_.sh_degree);
@@ -160,7 +160,7 @@ const Buffer& Renderer::draw(const Camera& camera, const glm::vec3& background, 
 
 ImageF Renderer::render_depth() {
     if (view_.camera.width == 0)
-        throw Error("render", "depths of no picture", "Call render() first.");
+        throw Error("render", "there is no picture to take depths from", "Call render() first.");
     const int width = static_cast<int>(view_.camera.width);
     const int height = static_cast<int>(view_.camera.height);
     commands_.begin();

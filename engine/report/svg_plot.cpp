@@ -1,6 +1,7 @@
 #include "engine/report/svg_plot.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>

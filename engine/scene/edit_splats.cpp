@@ -1,6 +1,7 @@
 #include "engine/scene/edit_splats.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
@@ -63,7 +64,7 @@ bool row_is_finite(const std::vector<float>& values, std::size_t row, std::size_
 
 void transform_splats(const Similarity& similarity, SplatModel& model) {
     if (!(similarity.scale > 0))
-        throw Error("transform", fmt::format("a scale of {}", similarity.scale),
+        throw Error("transform", fmt::format("the scale is {}", similarity.scale),
                     "Use a scale above 0.");
     std::vector<double> positions(model.position.size());
     for (std::size_t i = 0; i < model.size(); ++i) {

@@ -1,6 +1,7 @@
 #include "engine/scene/gltf.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -717,7 +718,9 @@ SplatModel load_gltf(const SplatSource& source, SplatFile& file) try {
 } catch (const json::exception& error) {
     throw Error(source.where, json_reason(error), kCopyAgain);
 } catch (const std::out_of_range& error) {
-    throw Error(source.where, std::string("names what is not there: ") + error.what(), kCopyAgain);
+    throw Error(source.where,
+                std::string("refers to something that does not exist: ") + error.what(),
+                kCopyAgain);
 }
 
 // Whether this is a .glb, or JSON that names the extension or is named .gltf.
@@ -936,7 +939,7 @@ std::vector<std::string> fallback_losses(const SplatModel& model, const std::str
 EncodedSplats encode(const SplatModel& model, const std::string& where, const EncodeOptions&) {
     check_splat_shapes(model);
     if (model.size() == 0)
-        throw Error(where, "glTF has no place for a scene without splats", "Write a PLY.");
+        throw Error(where, "glTF cannot store a scene without splats", "Write a PLY.");
     GltfWriter writer;
     json document = document_of(model, writer);
     const auto text = [&] { return document.dump(-1, ' ', false, json::error_handler_t::replace); };

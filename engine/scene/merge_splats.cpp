@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/gtc/quaternion.hpp>
+
 #include <limits>
 #include <nanoflann.hpp>
 #include <numbers>
@@ -305,7 +306,8 @@ std::vector<SplatModel> merge_levels(const SplatModel& model,
     if (counts.empty()) return levels;
     for (std::size_t i = 0; i < counts.size(); ++i)
         if (counts[i] == 0 || (i > 0 && counts[i] > counts[i - 1]))
-            throw Error("merge_levels", fmt::format("count {} of level {}", counts[i], i),
+            throw Error("merge_levels",
+                        fmt::format("cannot merge to the count {} of level {}", counts[i], i),
                         "Give counts that fall and end above 0.");
     Merging merging(model, counts.back(), options);
     for (const std::size_t count : counts) {

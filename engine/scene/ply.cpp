@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -353,10 +354,10 @@ void read_ply_comments(const PlyHeader& header, const std::string& where, SplatM
         model.footprint = *footprint;
     }
     if (model.footprint == Footprint::exact && !has_exact_footprint(model.kernel))
-        throw Error(
-            where,
-            fmt::format("names SplatFootprint exact, which {} has not", kernel_name(model.kernel)),
-            "Correct the comment to psi, or remove it.");
+        throw Error(where,
+                    fmt::format("names SplatFootprint exact, which {} does not have",
+                                kernel_name(model.kernel)),
+                    "Correct the comment to psi, or remove it.");
     read_render_mode(header, model, notes);
     if (stated_up(header) == "z")
         notes.emplace_back(

@@ -4,6 +4,7 @@
 #include <webp/decode.h>
 #include <webp/encode.h>
 #include <zip.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -217,7 +218,7 @@ void read_harmonics(Scene& scene) {
 
 void check_version(const json& meta, const std::string& where) {
     if (!meta.is_object() || !meta.contains("means"))
-        throw Error(where + ", meta.json", "describes no SOG scene: it has no means",
+        throw Error(where + ", meta.json", "does not describe a SOG scene: it has no means",
                     "Name the folder or the .sog file of a SOG scene.");
     const int version = meta.value("version", 1);
     if (version != 2)
@@ -403,7 +404,7 @@ SogPart open_sog_zip(std::span<const std::byte> zip, const std::string& where) {
     if (zip_name_locate(archive.get(), "meta.json", 0) < 0) {
         const std::string scene = packed_scene(archive.get());
         throw Error(where,
-                    "is a zip and no SOG scene: it has no meta.json" +
+                    "is a zip, but not a SOG scene: it has no meta.json" +
                         (scene.empty() ? "" : ", and holds " + scene),
                     scene.empty() ? "Name a splat file." : "Unpack it and name that file.");
     }
@@ -651,7 +652,7 @@ EncodedSplats encode_sog_parts(const SplatModel& scene, const std::string& where
                                const EncodeOptions& options) {
     check_splat_shapes(scene);
     if (scene.size() == 0)
-        throw Error(where, "SOG has no place for a scene without splats", "Write a PLY.");
+        throw Error(where, "SOG cannot store a scene without splats", "Write a PLY.");
     if (scene.size() > kMostSide * kMostSide / 2)
         throw Error(
             where,

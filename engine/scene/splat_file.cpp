@@ -1,6 +1,7 @@
 #include "engine/scene/splat_file.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <new>
@@ -59,7 +60,7 @@ void check_shape_has_a_place(const SplatFormatRow& row, const SplatModel& model,
                              const std::string& where) {
     if ((row.keeps & kKeepsShape) || !kernel_has_shape(model.kernel)) return;
     throw Error(where,
-                fmt::format("{} has no place for the shape that each splat of the kernel {} has",
+                fmt::format("{} cannot store the shape that each splat of the kernel {} has",
                             row.name, kernel_name(model.kernel)),
                 "Write .ply, or the nearest Gaussians: darb convert --kernel gaussian.");
 }
@@ -278,7 +279,7 @@ EncodedSplats encode_scene(SplatFormat format, const SplatModel& scene, const st
                            const EncodeOptions& options) {
     const SplatFormatRow& row = row_of(format);
     if (!row.encode)
-        throw Error(where, fmt::format("{} is read and not written", row.name),
+        throw Error(where, fmt::format("{} can be read, but not written", row.name),
                     "Write one that ends in " + endings_to_write() + ".");
     check_shape_has_a_place(row, scene, where);
     SplatModel copy;
@@ -290,7 +291,7 @@ std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model
                                      const std::string& where) {
     EncodedSplats encoded = encode_scene(format, model, where);
     if (!encoded.beside.empty())
-        throw Error(where, "is several files, not one", "Use save_splats.");
+        throw Error(where, "takes several files, not one", "Use save_splats.");
     return std::move(encoded.file);
 }
 

@@ -15,10 +15,11 @@ void check_splat_shapes(const SplatModel& model) {
         if (const std::size_t held = attribute_values(model, a).size(),
             wanted = model.size() * model.floats(a);
             held != wanted)
-            throw Error("splat model",
-                        fmt::format("{} holds {} values, {} splats need {}", attribute_name(a),
-                                    held, model.size(), wanted),
-                        "Each array holds the values of all splats, as splat_attributes.h says.");
+            throw Error(
+                "splat model",
+                fmt::format("{} holds {} values, but {} splats need {}", attribute_name(a), held,
+                            model.size(), wanted),
+                "Each array holds the values of all splats: see engine/scene/splat_model.h.");
     if (kernel_takes(model.kernel, kShape) && model.shape.size() != model.size())
         throw Error("splat model",
                     fmt::format("{} splats of the kernel {} have no shape", model.size(),

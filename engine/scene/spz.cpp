@@ -1,6 +1,7 @@
 #include "engine/scene/spz.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -36,7 +37,7 @@ Header read_header(Bytes bytes, const std::string& where) {
             fmt::format("holds {} bytes; the SPZ header has {}", bytes.size(), spz::kOldHeader),
             kCopyAgain);
     if (load_le<std::uint32_t>(bytes, 0) != spz::kMagic)
-        throw Error(where, "the content is no SPZ: it does not begin with NGSP",
+        throw Error(where, "the content is not SPZ: it does not begin with NGSP",
                     "Unpack a gzip file of another kind first.");
     Header header;
     header.version = load_le<std::uint32_t>(bytes, 4);
@@ -451,7 +452,7 @@ std::vector<std::byte> encode_spz(const SplatModel& scene, const std::string& wh
                                   int precision) {
     check_splat_shapes(scene);
     if (version != 3 && version != 4)
-        throw Error(where, fmt::format("SPZ version {} is not written", version), "Use 3 or 4.");
+        throw Error(where, fmt::format("SPZ version {} cannot be written", version), "Use 3 or 4.");
     SplatModel model = scene;
     transform_splats({1, kToRightUpBack, glm::dvec3(0.0)}, model);
     const int fractional_bits = choose_fractional_bits(model, where);

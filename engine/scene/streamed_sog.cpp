@@ -140,7 +140,7 @@ std::map<std::size_t, SplatModel> read_chunks_of(const json& meta, const SplatSo
         SogFacts facts;
         chunks[index] = read_sog_folder(folder, &facts);
         if (facts.dropped > 0)
-            throw Error(folder.string(), "holds splats with NaN, so that its rows are not known",
+            throw Error(folder.string(), "holds splats with NaN, so its rows cannot be numbered",
                         kCopyAgain);
         file.notes.insert(file.notes.end(), facts.notes.begin(), facts.notes.end());
     }
@@ -321,7 +321,7 @@ std::vector<std::size_t> usual_levels(std::size_t splats) {
 EncodedSplats encode_streamed(const SplatModel& model, const std::string& where,
                               const EncodeOptions& options) {
     if (model.size() == 0)
-        throw Error(where, "streamed SOG has no place for a scene without splats", "Write a PLY.");
+        throw Error(where, "streamed SOG cannot store a scene without splats", "Write a PLY.");
     LodWriter writer;
     writer.options = options;
     writer.where = where;

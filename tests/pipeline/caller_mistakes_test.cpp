@@ -1,5 +1,4 @@
-// What a caller of the library can get wrong is an Error with a remedy, and leaves what it was
-// called on usable.
+// Mistakes of a caller of the library give an Error with a remedy, and leave the object usable.
 #include "engine/core/error.h"
 #include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"

@@ -1,6 +1,6 @@
 // Gradients of the camera: the device's in float against the double reference, and that against
-// central differences of its own pictures, for every kernel and footprint, with lenses and with
-// what else is in the projection.
+// central differences of its own pictures, for every kernel and footprint, with lenses and with the
+// projection's other effects.
 #include <array>
 #include <cmath>
 
@@ -67,7 +67,8 @@ std::vector<double> exact_gradient(const TestScene& scene) {
     return along_all(as_device(truth.camera), scene.camera);
 }
 
-/// Across a cut-off pictures jump: a difference whose two pictures blend other samples is left out.
+/// Pictures jump across a cut-off, so a difference whose two pictures blend different samples is
+/// left out.
 void compare_differences(const TestScene& scene) {
     const WeightedLoss loss(scene.camera);
     const std::vector<double> exact = exact_gradient(scene);
@@ -116,7 +117,7 @@ TestScene scene_of(int kernel, Footprint footprint) {
                          .seed = 43});
 }
 
-// Without the device, which is to follow the reference for each of them.
+// Without the device, which must follow the reference for each of them.
 TEST(CameraGradient, of_the_reference_is_its_differences_with_every_kernel) {
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
         for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
@@ -178,7 +179,7 @@ TEST(CameraGradient, of_the_device_holds_through_every_lens_long) {
     }
 }
 
-// What training takes: the sums on the device are those of the shares.
+// As in training: the sums on the device equal those of the shares.
 TEST(CameraSums, of_the_device_are_those_of_the_host) {
     Device& device = shared_device();
     CameraSums sums(device);

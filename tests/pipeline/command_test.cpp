@@ -1,5 +1,5 @@
 // The built darb command, as a user runs it: exit codes, what errors name, and what info and
-// devices put out.
+// devices print.
 
 #include <gtest/gtest.h>
 

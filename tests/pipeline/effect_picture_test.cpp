@@ -1,5 +1,6 @@
-// Each effect on a scene that needs it and on one that does not: the plan is right on both, the
-// picture of auto is that of all, and without the effect the picture of the first is another one.
+// Each effect on a scene that needs it and on one that does not: the plan is right for both, the
+// picture with auto equals that with all effects, and without the effect the first scene's picture
+// changes.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -210,7 +211,7 @@ std::vector<float> trained(const TinyTraining& t, const TrainOptions& options, i
     return values;
 }
 
-// A step is of the sign of a gradient, however small that is.
+// A step has the sign of a gradient, however small that is.
 testing::AssertionResult same_training(const std::vector<float>& a, const std::vector<float>& b) {
     return same_but_for_fusing(a, b, 0.05);
 }
@@ -283,7 +284,7 @@ TEST(EffectTraining, centred_pinholes_train_alike_with_off_centre_and_lens_compi
     EXPECT_TRUE(plan_training(t.dataset, t.photos, 0).on(EFFECT_OFF_CENTRE));
 }
 
-// Off, the arithmetic of the gradients rounds otherwise: what is an identity is the picture.
+// With the effect off, gradients are rounded differently; what must be identical is the picture.
 TEST(EffectTraining, near_plane_care_is_always_on_as_splats_move) {
     TinyTraining t = tiny_training();
     for (View& view : t.dataset.views) {  // wide enough for every splat to be in view

@@ -1,4 +1,4 @@
-// No command writes over what it reads, by whatever name; a full disk behind stdout is an error.
+// No command overwrites what it reads, whatever the name; a full disk behind stdout is an error.
 #include <sys/stat.h>
 
 #include <map>
@@ -95,7 +95,7 @@ TEST_F(Outputs, no_command_writes_over_its_input) {
     expect_as_before();
 }
 
-// Work of others that no command reads: numbers and frames replace their own kind alone.
+// Files that no command reads: numbers and frames replace only their own kind.
 TEST_F(Outputs, scenes_and_photos_of_others_are_left_alone) {
     const std::string s = ply().string(), other = link("other.ply"), photo = link("other.png"),
                       cameras = link("cameras.json"), frames = link("frames");
@@ -165,7 +165,7 @@ TEST_F(Outputs, a_full_disk_behind_stdout_is_an_error) {
     EXPECT_TRUE(fs::exists(folder_ / "out" / "metrics.json")) << "the run itself is complete";
 }
 
-// What was asked for besides is written all the same.
+// What was asked for besides is still written.
 TEST_F(Outputs, a_reader_that_is_gone_ends_no_command) {
     const std::string data = data_.string(), s = ply().string(), out = folder_.string() + "/out";
     const std::vector<std::vector<std::string>> commands{

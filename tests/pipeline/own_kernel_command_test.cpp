@@ -1,4 +1,4 @@
-// Kernels of one's own, as a user gives them to each command.
+// A user's own kernels, given to each command.
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -1,4 +1,4 @@
-// darb train on photos without cameras: what it says without COLMAP, and what it asks of one.
+// darb train on photos without cameras: what it says without COLMAP, and how it calls it.
 
 #include <gtest/gtest.h>
 

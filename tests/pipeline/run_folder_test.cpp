@@ -1,5 +1,5 @@
-// The output folder of darb train over several runs: whose scene it is, what --resume goes on with,
-// and what --schedule writes into the settings of a run.
+// The output folder of darb train over several runs: whose scene it holds, what --resume continues
+// with, and what --schedule writes into the settings of a run.
 #include <gtest/gtest.h>
 
 #include <filesystem>

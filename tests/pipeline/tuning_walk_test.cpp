@@ -1,5 +1,5 @@
-// The walk in every way of its passes gives the same bits where the tuning says so, and a run keeps
-// the way that it began with. walk_test compares both backward blends with double.
+// Every way of the walk's passes gives equal bits where the tuning says so, and a run keeps the way
+// that it began with. walk_test compares both backward blends with double.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

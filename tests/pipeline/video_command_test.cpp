@@ -65,7 +65,7 @@ TEST(VideoCommand, sound_and_a_file_that_is_cut_off_are_told_apart) {
         EXPECT_NE(o.err.find(part), std::string::npos) << o.err;
     };
     says("sine=duration=1 -c:a aac", "holds no pictures");
-    says("testsrc=size=32x24:duration=1 -c:v mpeg4", "It is not whole");
+    says("testsrc=size=32x24:duration=1 -c:v mpeg4", "It is incomplete");
 }
 
 TEST(VideoCommand, its_sharpest_pictures_go_to_colmap_in_their_order) {

@@ -1,5 +1,5 @@
-// Views with gradients, as a program of one's own calls for them: against the double reference, of
-// one view and of several added, a step of Adam of them, and what a caller can get wrong.
+// Views with gradients, as a user's own program requests them: against the double reference, for
+// one view and several added, an Adam step from them, and a caller's mistakes.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -140,7 +140,7 @@ TEST(ViewGradients, of_no_splats_are_empty) {
     for (int a = 0; a < kAttributeCount; ++a) EXPECT_TRUE(attribute_values(view.d, a).empty());
 }
 
-/// Whether it throws an Error whose words have `part`.
+/// Whether the call throws an Error whose text contains `part`.
 testing::AssertionResult refuses(const std::function<void()>& call, const std::string& part) {
     try {
         call();
@@ -180,7 +180,7 @@ TEST(ViewGradients, errors_of_the_caller_are_thrown) {
     with_nan.at(3, 2, 1) = nan;
     EXPECT_TRUE(refuses([&] { renderer.backward(with_nan); }, "(3, 2), channel 1"));
     EXPECT_NO_THROW(renderer.backward(good)) << "an error leaves the picture";
-    EXPECT_TRUE(refuses([&] { renderer.update(random_scene({.count = 6}).model); }, "other"));
+    EXPECT_TRUE(refuses([&] { renderer.update(random_scene({.count = 6}).model); }, "differs"));
 }
 
 TEST(ViewGradients, a_step_of_rates_that_are_no_numbers_is_refused) {
@@ -277,7 +277,7 @@ TEST(ViewGradients, of_several_views_make_one_step_as_in_double) {
         if (truth[at].empty()) continue;
         EXPECT_TRUE(compare_scaled(std::string("sum of d_") + attribute_name(a), truth[at],
                                    sum.download(a), tolerance("gradient_scaled_float32")));
-        // Adam of the device's own sums: a first step is the sign of a gradient.
+        // Adam from the device's own sums: a first step is the sign of a gradient.
         const std::vector<float> got = sum.download(a);
         const std::vector<float>& before = attribute_values(views.scene.model, a);
         std::vector<double> x(before.begin(), before.end()), g, first(x.size()), second(x.size());

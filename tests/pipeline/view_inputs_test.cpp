@@ -1,5 +1,5 @@
-// What a caller may give beside a model: opacities and scales themselves, colours, a loss of the
-// pixels' opacity; and what it may ask for: gradients of the background. Against the double
+// What a caller may give besides a model (plain opacities and scales, colours, a loss on the
+// pixels' opacity) and what it may ask for (gradients by the background), against the double
 // reference and its central differences.
 #include <cmath>
 
@@ -18,7 +18,7 @@ TestScene small_scene(int kernel = KERNEL_GAUSSIAN, std::uint64_t seed = 41) {
     return random_scene({.count = 40, .width = 48, .height = 40, .kernel = kernel, .seed = seed});
 }
 
-/// The same splats by opacities and scales.
+/// The same splats with plain opacities and scales.
 SplatModel linear_model(SplatModel model) {
     for (float& o : model.opacity_logit) o = static_cast<float>(sigmoid(o));
     for (float& s : model.log_scale) s = std::exp(s);

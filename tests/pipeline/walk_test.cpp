@@ -157,7 +157,7 @@ TEST(WalkCases, needles_and_discs_match_double) {
         }
 }
 
-// Long on the screen: there the factor times the rows would lose what the product keeps.
+// Long on the screen: there, the factor times the rows would lose what the product keeps.
 TEST(WalkCases, needles_across_the_picture_match_double) {
     TestScene s = random_scene(
         {.count = 40, .width = 121, .height = 83, .sh_degree = 0, .max_logit = 0, .seed = 57});
@@ -180,7 +180,7 @@ TEST(WalkCases, backward_by_buckets_matches_double) {
                         tolerance("gradient_scaled_float32"));
 }
 
-// The runs at other vector widths are worth something only where the width takes effect.
+// Runs at other vector widths are worth something only where the width takes effect.
 TEST(Subgroup, size_is_that_of_the_vector_width) {
     const char* width = std::getenv("LP_NATIVE_VECTOR_WIDTH");
     if (width == nullptr || !shared_device().is_lavapipe()) return;

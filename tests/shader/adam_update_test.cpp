@@ -1,4 +1,4 @@
-// The Adam step inside project_backward.comp against Adam in double, and what it must leave alone.
+// The Adam step inside project_backward.comp against Adam in double, and what it must not change.
 #include "engine/reference/adam.h"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ void expect_step_matches(const PassState& before, const PassState& gradient, con
             const double was = before.parameters[a][i];
             move.push_back((x[i] - was) / rate_of(a));
             got_move.push_back((double(after.parameters[a][i]) - was) / rate_of(a));
-            // The parameter itself is rounded: that much of the move is nobody's fault.
+            // The parameter itself is rounded, which limits the accuracy of the move.
             const double rounding = std::abs(was) * 0x1p-23 / rate_of(a);
             EXPECT_NEAR(got_move[i], move[i], 2e-5 * (1 + std::abs(move[i])) + rounding)
                 << attribute_name(a) << " " << i << ", step " << t;
@@ -93,7 +93,7 @@ TEST(AdamUpdate, late_steps_match_double) {
     }
 }
 
-// The other attributes step each time, as without.
+// The other attributes step every time, as they do otherwise.
 TEST(AdamUpdate, harmonics_step_every_fourth_time_of_the_mean_gradient) {
     constexpr int kEvery = 4;
     Training training;
@@ -156,7 +156,8 @@ TEST(AdamUpdate, zero_moments_and_zero_gradient_move_nothing) {
     EXPECT_EQ(training.update(state, 3000), state);
 }
 
-// An unseen splat of mcmc: its gradient is the regularisers' alone, weight o (1 - o) and weight s.
+// An unseen splat with mcmc: its gradient is that of the regularisers alone, weight o (1 - o) and
+// weight s.
 TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     Training training(20);
     training.partials.count.assign(20, 0);
@@ -180,7 +181,7 @@ TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     EXPECT_EQ(after.parameters[kPosition], state.parameters[kPosition]);
 }
 
-// Adam would make full steps of them, where no photo has said anything yet.
+// Adam would turn these into full steps, although no photo has said anything yet.
 TEST(AdamUpdate, regularisers_leave_what_the_frame_does_not_show) {
     Training training(20);
     const PassState state = start_state(training.scene.model);
@@ -204,8 +205,8 @@ TEST(AdamUpdate, regularisers_leave_what_the_frame_does_not_show) {
     EXPECT_LT(seen, 20);
 }
 
-// exp(100) is no float: beyond the limit the regulariser has no gradient, as all that reads a
-// scale.
+// exp(100) overflows float: beyond the limit the regulariser has no gradient, as everywhere that a
+// scale is read.
 TEST(AdamUpdate, regularisers_leave_scales_beyond_their_limit) {
     Training training(20);
     training.partials.count.assign(20, 0);
@@ -298,7 +299,7 @@ TEST(AdamUpdate, gradient_sum_adds_up_over_frames) {
 
 TEST(AdamUpdate, a_gradient_that_is_not_finite_is_counted_and_skipped) {
     const float infinity = std::numeric_limits<float>::infinity();
-    // 1e25 is finite, and its square would stay in the second moment as infinity.
+    // 1e25 is finite, but its square would stay in the second moment as infinity.
     for (const float bad : {std::nanf(""), infinity, -infinity, 1e25f})
         for (size_t value = 0; value < 9; ++value) {
             SCOPED_TRACE(fmt::format("{} in partial {}", bad, value));

@@ -72,7 +72,7 @@ TEST_P(Blend, opaque_stack_stops_before_the_transmittance_limit) {
         scene.add({8.5 + i / 2 % 3, 8.5}, {200, 0, 200}, 1, {i % 2 * 1.0, 1 - i % 2, 0.5});
     const Blended b = expect_blend_matches(scene);
     for (const double t : b.truth.transmittance.data) ASSERT_LT(t, 0.02);
-    // 0.01 of each clamped layer is left: two of them meet the stop and do not cross it.
+    // Each clamped layer lets 0.01 through: two of them meet the stop exactly, and do not cross it.
     EXPECT_NEAR(b.pixel(8, 8, 0), 0.01 * 0.99 + 1e-4 * 0.1, 2e-8);
     EXPECT_NEAR(b.got.transmittance[8 * 16 + 8], 1e-4, 1e-9);
     EXPECT_EQ(b.got.last[8 * 16 + 8], 2U);
@@ -137,8 +137,8 @@ double largest_difference(const std::vector<float>& a, const std::vector<float>&
     return most;
 }
 
-// Where a pixel ended may differ by intersections that miss its block, of which a larger area sees
-// some; q rounds otherwise, as a thread has it from its first pixel.
+// The place where a pixel ended may differ by intersections that miss its block, some of which a
+// larger area includes; and q is rounded differently, as a thread computes it from its first pixel.
 TEST(BlendCases, every_shape_of_workgroup_gives_the_same_picture) {
     BlendScene scene = kCosine.scene(53, 37);
     scene.add_random(150, 4, 0.01, 1);

@@ -1,5 +1,5 @@
-// Density control on the device against the decisions of the reference: who stays, who grows, where
-// the new splats come from and lie, and what becomes of their moments.
+// Density control on the device against the decisions of the reference: which splats stay and grow,
+// where new splats come from and lie, and what happens to their moments.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -47,7 +47,7 @@ struct Population {
         }
     }
 
-    /// Moments are 1, 2, 3, ... so that every one is known again.
+    /// Moments are 1, 2, 3, ..., so that each can be recognised.
     Generation run(const gpu::DensifyArgs& args, DensityResult& result,
                    int kernel = KERNEL_GAUSSIAN, std::uint32_t max_splats = kNoLimit,
                    Footprint footprint = Footprint::psi) const {

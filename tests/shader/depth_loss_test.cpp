@@ -1,5 +1,5 @@
-// The loss of measured depths: its pass against the same in double, its gradient through blending
-// to every parameter and to the camera against the reference, whose own differences are tested, and
+// The loss of measured depths: its pass against double; its gradient through blending, by every
+// parameter and by the camera, against the reference, which is tested against differences; and
 // smaller photos.
 #include "trainer/step/step.h"
 
@@ -22,8 +22,8 @@ namespace {
 constexpr float kWeight = 0.5f;
 constexpr double kUsual = 3;
 
-/// uint [pixels] colours, every 7th pixel transparent, then float [pixels] depths: every 5th was
-/// not measured.
+/// uint [pixels] colours with every 7th pixel transparent, then float [pixels] depths with every
+/// 5th not measured.
 std::vector<std::uint32_t> measured_photo(std::size_t pixels) {
     Pcg32 random(31);
     std::vector<std::uint32_t> words(2 * pixels);

@@ -1,5 +1,5 @@
-// The effects' own passes against the same in double: exposure forward, backward and its step, the
-// 3D smoothing filter, the depth image.
+// The effects' own passes against double: exposure forward, backward and its step, the 3D smoothing
+// filter, and the depth image.
 #include "engine/core/rng.h"
 #include "engine/reference/adam.h"
 #include "engine/reference/reference_render.h"
@@ -121,7 +121,8 @@ TEST(ExposurePass, map_gradient_and_step_match_double_on_any_size) {
     }
 }
 
-// Random backgrounds of photos with transparent parts would else pull every map to the identity.
+// Otherwise random backgrounds of photos with transparent parts would pull every map to the
+// identity.
 TEST(ExposurePass, what_nothing_covers_keeps_the_background_and_says_nothing_of_the_map) {
     constexpr size_t kPixels = 100;
     std::vector<float> image;

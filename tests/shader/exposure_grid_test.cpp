@@ -14,7 +14,7 @@ constexpr int kSides[3] = {EXPOSURE_GRID_X, EXPOSURE_GRID_Y, EXPOSURE_GRID_L};
 constexpr ExposureMaps kMaps{2, true};
 constexpr double kLightBehind[3] = {0.9, 0.2, 0.6};
 
-/// A picture of what splats show and how much of the background is seen, a gradient, two grids.
+/// A picture of the splats, how much of the background shows, a gradient, and two grids.
 struct Case {
     std::vector<double> colours, open, d, maps;
 };
@@ -54,7 +54,7 @@ std::array<double, 3> mapped(const Case& c, std::uint32_t p) {
     return sum;
 }
 
-/// The loss whose gradient is d, at one pixel and, of `maps`, their smoothness.
+/// The loss whose gradient is d at one pixel, plus the smoothness of `maps`.
 double loss_at(const Case& c, std::uint32_t p) {
     const auto value = mapped(c, p);
     double sum = 0;

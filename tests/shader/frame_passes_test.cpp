@@ -268,8 +268,8 @@ TEST(Emit, a_total_beyond_32_bits_lists_no_more_huge_splats_than_fit) {
     EXPECT_GT(out.status.huge_splats, 2 * (1000 / HUGE_INTERSECTIONS + 1));
 }
 
-// Against every pixel: a block that the bits leave out holds no pixel above the cut-off, and one
-// that they name is within the ellipse and its slack.
+// Compares with every pixel: a block that the bits leave out has no pixel above the cut-off, and
+// one that they name is within the ellipse and its slack.
 TEST(Emit, block_bits_name_the_blocks_that_are_touched) {
     const EmitInput in(kEmitScene);
     const Emitted out = emit(in, in.intersections);

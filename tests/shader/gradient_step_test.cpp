@@ -1,6 +1,6 @@
-// The two ways of a step of the optimiser, from one view: within project_backward.comp, and as
-// gradients in buffers with adam_update.comp behind them. For every kernel, each effect that
-// training has and each rule beside Adam.
+// The two ways of an optimiser step from one view: inside project_backward.comp, and with gradients
+// in buffers followed by adam_update.comp. For every kernel, each effect in training, and each rule
+// besides Adam.
 #include "engine/core/rng.h"
 #include "engine/raster/adam.h"
 #include "engine/raster/backward.h"

@@ -1,4 +1,5 @@
-// The mean of the splats over iterations: against one in double, what it holds and gives back.
+// The mean of the splats over iterations: compared with one in double, and what it holds and
+// returns.
 #include "trainer/step/iterate_average.h"
 
 #include <gtest/gtest.h>

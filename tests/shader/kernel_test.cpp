@@ -22,7 +22,7 @@ namespace darb {
 namespace {
 
 constexpr double kCutoff = 1 / 255.0;
-// The built-in sin and cos may be 2^-11 off by the letter of Vulkan; no driver is that bad.
+// By the letter of Vulkan, the built-in sin and cos may be off by 2^-11; no driver is that bad.
 constexpr double kBuiltinRounding = 2e-5;
 
 struct Variant {
@@ -350,7 +350,7 @@ TEST_F(KernelShader, ReferenceVectors_agreeWithinTheBoundOfQ) {
         for (std::size_t i = 0; i < cases.size(); ++i) {
             const test::KernelVector& v = *cases[i];
             const double bound = float_q(v).bound;
-            // Within rounding of the edge a kernel with a jump, and every slope, may be on either
+            // Within rounding of the edge, a kernel with a jump, and every slope, may be on either
             // side.
             const bool edge = std::abs(v.q - variant.support()) <= bound + 1e-6 * v.q;
             at_the_edge += edge;

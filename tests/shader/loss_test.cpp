@@ -276,7 +276,7 @@ TEST(Loss_opaquePhoto_ignoresBackground, matches_brute_force) {
     expect_matches({.width = 61, .height = 43, .opaque = true});
 }
 
-// Photos without alpha: what reads it is compiled out, and the results are the same.
+// Photos without alpha: the code that reads alpha is compiled out, and the results stay equal.
 TEST(Loss_opaquePhoto_withoutAlpha, is_the_same) {
     const Case c{.width = 61, .height = 43, .opaque = true};
     const Data data = make_data(c);

@@ -1,5 +1,5 @@
-// The passes of the strategy mcmc against double precision, one after the other and together; and
-// the law that they are for: a splat that several take the place of looks as it did.
+// The passes of the strategy mcmc against double precision, one by one and together; and the law
+// that they serve: a splat replaced by several looks as it did.
 #include "trainer/growth/relocation.h"
 
 #include "engine/core/rng.h"
@@ -324,9 +324,9 @@ double line(const Image<double>& image) {
 
 class RelocationPicture : public testing::TestWithParam<std::pair<int, Footprint>> {};
 
-// One splat of opacity 1/2 and two dead ones: then three in its place. The integral over a line
-// through the centre is what the law keeps; the picture as a whole changes by a few per cent (of
-// the sum of its differences to copies that are not adapted, less than a quarter).
+// One splat with opacity 1/2 and two dead ones become three in its place. The law preserves the
+// integral along a line through the centre. The picture as a whole changes by a few per cent (less
+// than a quarter of what copies that are not adapted change).
 TEST_P(RelocationPicture, stays_when_three_take_the_place_of_one) {
     const auto [kernel, footprint] = GetParam();
     TestScene scene = random_scene({.count = 3, .sh_degree = 0, .seed = 2});

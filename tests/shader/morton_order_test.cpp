@@ -1,5 +1,5 @@
-// Splats in Morton order: against a stable sort on the host, with all that belongs to a splat, and
-// the picture that they make.
+// Splats in Morton order: against a stable sort on the host, with everything that belongs to a
+// splat, and the resulting picture.
 #include "trainer/growth/morton_order.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// project_backward.comp alone, its gradients stored and not applied, against the reference for the
-// same sums of intersections.
+// project_backward.comp alone, with its gradients stored rather than applied, against the reference
+// for the same sums per intersection.
 #include "tests/support/backward_pass.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/every_kernel.h"
@@ -8,8 +8,8 @@
 namespace darb::test {
 namespace {
 
-/// Every splat must be visible to the reference. Each is compared on its own scale: gradients of
-/// different splats differ by more than their rounding.
+/// Every splat must be visible in the reference. Each is compared on its own scale, because
+/// gradients of different splats differ by more than their rounding.
 void expect_gradients_match(const SplatModel& model, const Camera& camera, int sh_degree = 3) {
     const Tolerance& allowed = tolerance("project_gradient_float32");
     const int degree = std::min(sh_degree, model.sh_degree);

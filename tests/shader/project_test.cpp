@@ -15,7 +15,7 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// What the reference says of each splat, tiles included.
+/// The reference's result for each splat, including its tiles.
 std::vector<reference::ProjectedSplat<double>> project_in_double(const SplatModel& model,
                                                                  const Camera& camera,
                                                                  int sh_degree = 3) {
@@ -30,8 +30,8 @@ std::vector<reference::ProjectedSplat<double>> project_in_double(const SplatMode
     return all;
 }
 
-/// The factor as what it is for: q at points on the ellipse, where it is 1 by the reference. The
-/// error of q there bounds that of every pixel, relative to its q.
+/// Tests the factor by its purpose: q at points on the ellipse, where it is 1 in the reference. The
+/// error of q there bounds that at every pixel, relative to its q.
 double worst_q_error(const reference::ProjectedSplat<double>& truth, const glm::vec4& shape,
                      const glm::vec4& bound) {
     double worst = 0;

@@ -1,5 +1,5 @@
-// Measured depths in training: they bring depths nearer, wait and shrink with their photos, and
-// where they are off no bit depends on them.
+// Measured depths in training: they bring depths closer, wait and shrink with their photos, and
+// change no bit where they are off.
 #include <fmt/format.h>
 
 #include "engine/data/depths.h"
@@ -20,7 +20,7 @@ TinyTraining measured_training(const TinyOptions& tiny = {}) {
     return t;
 }
 
-/// Mean over the held-out view of how far depths are off, world units.
+/// Mean error of depths over the held-out view, world units.
 double depth_error(Trainer& trainer, const TinyTraining& t) {
     Renderer renderer(shared_device(), trainer.model());
     const View& view = t.dataset.views[0];

@@ -88,7 +88,7 @@ TEST_F(FaultyRun, a_lost_device_is_logged_and_resumed_from) {
     EXPECT_NE(last["what"].get<std::string>().find("device was lost"), std::string::npos);
     expect_resumes_to(whole);
 
-    // What run log and metrics count, here of a run in which nothing went wrong.
+    // The counters in run log and metrics, for a run in which nothing went wrong.
     nlohmann::json logged;
     for (const nlohmann::json& event : events(folder_ / "whole"))
         if (event["event"] == "iteration") logged = event;

@@ -1,6 +1,6 @@
 // trainer/forecast: splats, time and memory before a run.
-#include "trainer/growth/predicted_growth.h"
 #include "trainer/run/forecast.h"
+#include "trainer/growth/predicted_growth.h"
 
 #include <gtest/gtest.h>
 
@@ -220,7 +220,7 @@ TEST(Forecast, a_random_start_has_no_degree_before_the_first_probe) {
     EXPECT_GT(peak().sh_degree, 0);
 }
 
-// The colour that comes after the last round of density control is no part of that round.
+// The colour that comes after the last round of density control is not part of that round.
 TEST(Forecast, the_memory_of_a_given_count_is_met_long) {
     const Dataset dataset = small_scene(2);
     for (const Strategy strategy : {Strategy::mcmc, Strategy::budget}) {
@@ -332,7 +332,7 @@ TEST(Forecast, counts_the_time_that_smaller_photos_save) {
     EXPECT_TRUE(forecast_training(scratch, small_scene(), options).ramp_ms.empty());
 }
 
-// A device that is lost passes for no lack of room, and leaves its settings as they were.
+// A lost device is not taken for a lack of memory, and leaves its settings as they were.
 TEST(Forecast, goes_without_times_for_want_of_room_alone) {
     const Dataset dataset = small_scene();
     TrainOptions options;

@@ -1,5 +1,5 @@
-// Frozen splats of a training run: whatever the strategy, they are drawn and keep every bit, and a
-// checkpoint goes on with the same bits.
+// Frozen splats in a training run: whatever the strategy, they are drawn and keep every bit, and a
+// run resumed from a checkpoint gives equal bits.
 #include <algorithm>
 
 #include "tests/support/resumed_run.h"
@@ -71,7 +71,7 @@ TEST(FrozenSplats, keep_every_bit_with_a_batch_and_with_other_strategies_long) {
     expect_frozen(t);
 }
 
-// What is all frozen is a scene that no iteration changes, and is drawn as the start is.
+// Where all splats are frozen, no iteration changes the scene, and it is drawn as at the start.
 TEST(FrozenSplats, of_all_splats_leave_the_picture_as_it_was) {
     TinyTraining t = many_splats();
     t.options.max_splats = 2 * kFrozen;

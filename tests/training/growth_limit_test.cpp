@@ -1,4 +1,4 @@
-// Where splats stop growing in number, and what a run does with the memory that there is.
+// Where splats stop growing in number, and how a run uses the memory that there is.
 #include "engine/core/error.h"
 #include "tests/support/resumed_run.h"
 #include "tests/support/scoped_variants.h"
@@ -24,7 +24,7 @@ TEST(Limits, splats_stop_growing_at_the_limit) {
     EXPECT_GT(trainer.counters().cloned_or_split, 5U);
 }
 
-/// Every splat grows in every round, none goes.
+/// Every splat grows in every round, and none is removed.
 TinyTraining growing(const TinyOptions& tiny) {
     TinyTraining t = tiny_training(tiny);
     t.options.prune_opacity = 0;
@@ -84,7 +84,7 @@ TEST(Limits, a_run_without_room_for_smaller_photos_trains_on_whole_ones) {
     EXPECT_EQ(narrow.counters().bad_gradients, 0U);
 }
 
-/// A budget that holds all but the mean: what is trained is not lost to it.
+/// A budget that holds everything but the mean: the training result is not lost because of it.
 TEST(Limits, a_run_without_room_for_its_mean_ends_without) {
     TinyTraining t = tiny_training();
     t.options.densify_until = 0;
@@ -151,7 +151,8 @@ TEST(Limits, growth_stops_at_the_largest_buffer) {
     EXPECT_EQ(trainer.splat_count(), 464U);
 }
 
-// Half more intersections than wanted are more than the device has: it gets those that are wanted.
+// Half more intersections than wanted exceed the device's memory: it gets only those that are
+// wanted.
 TEST(Limits, a_device_without_ample_room_for_the_backward_pass_gets_what_it_needs) {
     // One view wants more intersections than the first room of 1,024.
     TinyTraining t = tiny_training({.width = 320, .height = 200, .splats = 24, .close_up = 3});

@@ -87,7 +87,7 @@ TEST(InitialModel, a_cap_draws_from_the_whole_cloud) {
     EXPECT_LT(low, 10);  // the range is 0 to 99.9
     EXPECT_GT(high, 90);
     EXPECT_EQ(places.size(), 100U) << "a point was drawn twice";
-    // Distances are those of what was drawn: ten times as far apart as all.
+    // Distances are those between the drawn points: ten times as far apart as all.
     double mean = 0;
     for (const float scale : model.log_scale) mean += std::exp(scale) / 300;
     EXPECT_GT(mean, 5 * std::exp(double(initial_model(d, {}).log_scale[3 * 500])));

@@ -1,5 +1,5 @@
-// The darb command, killed without warning while it trains, goes on with --resume and ends with the
-// very bytes of a run that nobody killed.
+// The darb command, killed without warning while it trains, continues with --resume and ends with
+// exactly the bytes of an undisturbed run.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -124,7 +124,7 @@ TEST_F(KilledRun, resumes_to_the_bytes_of_a_run_that_nobody_killed) {
     EXPECT_FALSE(read_file(model(whole)).empty());
 }
 
-// The same by Ctrl-C, which saves first; and without repeating the arguments.
+// The same with Ctrl-C, which saves first; and without repeating the arguments.
 TEST_F(KilledRun, interrupted_run_saves_and_resumes_by_its_folder_alone) {
     const fs::path whole = folder_ / "whole", stopped = folder_ / "stopped";
     ASSERT_EQ(Command(training(whole), log()).wait(), 0) << read_text_file(log());
@@ -141,7 +141,7 @@ TEST_F(KilledRun, interrupted_run_saves_and_resumes_by_its_folder_alone) {
     EXPECT_EQ(read_file(model(stopped)), read_file(model(whole)));
 }
 
-// A comparison ends with the code of the signal and reports what the run came to.
+// A comparison ends with the signal's exit code, and reports the results so far.
 TEST_F(KilledRun, interrupted_comparison_keeps_the_evaluations_that_were_made) {
     const fs::path run = folder_ / "scene/gaussian/seed0";
     Command command(

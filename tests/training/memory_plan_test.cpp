@@ -41,7 +41,7 @@ TrainOptions options_of(int sh_degree, bool effects = false) {
     return options;
 }
 
-// What is there after an iteration from `splats` splats, by the plan for them and by the device.
+// What exists after an iteration with `splats` splats, by the plan for them and by the device.
 void compare_to_the_byte(const TrainOptions& options, std::uint32_t splats,
                          const std::string& ways = "", int resolution = 2) {
     const Dataset dataset = shipped_scene(resolution);
@@ -212,7 +212,7 @@ TEST(MemoryPlan, the_log_of_a_run_holds_plan_and_peak) {
     std::filesystem::remove_all(run.output);
 }
 
-// What a view says it paused the run is no training time: here far more than the run took.
+// Time for which a view paused the run is not training time; here it is far more than the run took.
 TEST(RunTime, a_pause_is_left_out) {
     TrainOptions options = options_of(1);
     RunOptions run;
@@ -229,8 +229,8 @@ TEST(RunTime, a_pause_is_left_out) {
     std::filesystem::remove_all(run.output);
 }
 
-// What the process grows by while it trains on photos of `scale` times 200x150 px, and their bytes.
-// Each view is there twice, so that photos outweigh all else.
+// How much the process grows while it trains on photos of `scale` times 200x150 px, and the
+// bytes of these. Each view is there twice, so that photos outweigh everything else.
 std::pair<std::uint64_t, std::uint64_t> growth_with_photos(Device& device, int scale) {
     Dataset dataset = shipped_scene(1);
     const std::vector<View> once = dataset.views;

@@ -1,5 +1,5 @@
-// What a run leaves in its folder for later: paths that move with it, files that are not as a run
-// writes them, a report that failed, a start that has no room. For the command.
+// What a run leaves in its folder for later: paths that move with it, files that no run writes, a
+// failed report, and a start without memory. For the command.
 #include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -51,7 +51,7 @@ class RunFiles : public testing::Test {
         fs::copy(fs::path(DARB_SOURCE_DIR) / "assets" / "scene" / "transforms_train.json",
                  data() / "transforms_train.json");
     }
-    // What was trained 2 iterations long and then interrupted.
+    // Trained for 2 iterations and then interrupted.
     void leave_unfinished(const std::string& options = "") const {
         ASSERT_EQ(train("--checkpoint-iterations 2 " + options).code, 0);
         fs::rename(run() / "chkpnt2.darb", run() / "checkpoint.darb");
@@ -134,7 +134,7 @@ TEST_F(RunFiles, a_line_that_a_kill_cut_off_does_not_count) {
     EXPECT_EQ(o.code, 0) << o.err;
 }
 
-// Whole by its checksum, and of no run that these options make.
+// Complete according to its checksum, but from no run that these options make.
 TEST_F(RunFiles, a_checkpoint_that_contradicts_its_settings_is_refused) {
     leave_unfinished();
     const fs::path path = run() / "checkpoint.darb";

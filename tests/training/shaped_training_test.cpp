@@ -1,5 +1,5 @@
-// Training of kernels whose shape each splat has of its own: every splat learns its shape, under
-// every strategy and with anti-aliasing; a run repeats, and resumes, bit by bit.
+// Training of kernels with a shape per splat: every splat learns its shape, under every strategy
+// and with anti-aliasing; a run repeats and resumes bit for bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -61,7 +61,8 @@ INSTANTIATE_TEST_SUITE_P(strategies, ShapedTraining, testing::ValuesIn(every_ker
                                     (some ? "" : "_long");
                          });
 
-// Photos of splats of one exponent, and the same splats at the start: training finds it.
+// Photos of splats with one exponent, and the same splats at the start shape: training finds the
+// exponent.
 TEST(ShapedTrainingRecovery, a_picture_of_exponent_4_is_fitted_from_2_long) {
     TinyTraining t = tiny_training();
     TestScene truth = random_scene({.count = 60,

@@ -59,8 +59,8 @@ void expect_batches_resume(Strategy strategy) {
     EXPECT_EQ(whole.iteration(), 28);
     ASSERT_EQ(results.size(), 28U);
     for (int i = 0; i < 28; ++i) EXPECT_EQ(results[static_cast<size_t>(i)], i + 1);
-    // The round of iteration 6 takes place with the batch that ends at 8, that of 12 with its own
-    // batch, those of 18 and 24 with the batch that ends at 24.
+    // The rounds of iterations 6 and 12 take place with the batches that end at 8 and 16, those of
+    // 18 and 24 with the batch that ends at 24.
     EXPECT_EQ(rounds, (std::vector<int>{8, 16, 24}));
     EXPECT_NE(whole.splat_count(), start) << "growth must take part";
     expect_resumes(t, whole, {16});
@@ -129,7 +129,7 @@ INSTANTIATE_TEST_SUITE_P(strategies, EveryStrategy,
                          testing::Values(Strategy::mcmc, Strategy::budget),
                          [](const auto& p) { return std::string(strategy_name(p.param)); });
 
-/// Whether a run with the options `now` resumes one with `then`; if not, the error says why.
+/// Whether a run with the options `now` resumes one with `then`; if not, the error tells why.
 testing::AssertionResult resumes(const TinyTraining& then, const TinyTraining& now) {
     Checkpoint checkpoint{{}, settings_text(then.options), "", 0};
     checkpoint.state.model.kernel = then.options.kernel;
@@ -142,7 +142,7 @@ testing::AssertionResult resumes(const TinyTraining& then, const TinyTraining& n
     return testing::AssertionSuccess();
 }
 
-/// Whether it does not, and the error says `why`.
+/// Whether it does not resume, and the error says `why`.
 testing::AssertionResult refuses(const TinyTraining& then, const TinyTraining& now,
                                  const std::string& why) {
     const testing::AssertionResult resumed = resumes(then, now);

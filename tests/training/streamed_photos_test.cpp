@@ -1,5 +1,5 @@
-// trainer/photos, forecast: photos that wait on the host train to the same bits, and are there
-// where memory calls for it.
+// trainer/photos, forecast: photos that wait on the host give equal bits in training, and are used
+// where memory requires it.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -106,7 +106,7 @@ TEST(StreamedPhotos, stream_where_a_budget_does_not_hold_them) {
     EXPECT_LE(device.peak_bytes(), *t.options.max_memory_bytes);
 }
 
-// What is decided for a device with memory of its own, of a size near that of a run.
+// The decisions for a device with its own memory, of a size close to what a run needs.
 TEST(StreamedPhotos, stream_where_the_device_does_not_hold_what_the_run_comes_to) {
     TinyTraining t = tiny_training({.views = 20});
     Device device{test::device_options()};

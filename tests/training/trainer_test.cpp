@@ -191,8 +191,8 @@ TEST(Training, frames_that_overflow_are_done_again_and_leave_no_trace) {
     EXPECT_EQ(tight.counters().culled, roomy.counters().culled);
 }
 
-// A colour of 1e25 makes SSIM, and with it dL/dimage, something that is no number: the run ends,
-// the splats stay as they were.
+// A colour of 1e25 makes SSIM, and with it dL/dimage, not a number: the run ends, and the splats
+// stay as they were.
 TEST(Training, gradients_that_are_not_finite_are_counted_over_the_whole_run) {
     const TinyTraining t = overflowing();
     Trainer trainer = t.trainer();
@@ -244,7 +244,7 @@ TEST(Training, map_coordinates_train_as_those_at_the_origin) {
         EXPECT_NEAR(losses[1][i], losses[0][i], 1e-3 * losses[0][i]) << "iteration " << i + 1;
 }
 
-// A splat that is culled for a number that is none has no influence on those beside it.
+// A splat culled because a parameter is not a number has no influence on its neighbours.
 TEST(Training, poisoned_splats_leave_the_others_alone) {
     TinyTraining t = tiny_training();
     t.options.densify_until = 0;
@@ -297,7 +297,7 @@ TEST(Training, one_splat_is_a_model) {
     for (const float value : trainer.model().position) EXPECT_TRUE(std::isfinite(value));
 }
 
-// What a binding does not hold is worked off range by range, density control included.
+// What does not fit a binding is processed range by range, density control included.
 TEST(Training, a_device_of_small_bindings_trains_the_same_bits) {
     TinyTraining t = tiny_training({.width = 32, .height = 24, .splats = 700});
     t.options.sh_degree = 3;
@@ -319,7 +319,7 @@ TEST(Training, a_device_of_small_bindings_trains_the_same_bits) {
     }
 }
 
-// So are the sums of intersections, window by window.
+// The same for the sums of intersections, window by window.
 TEST(Training, a_device_whose_bindings_hold_few_intersections_trains_the_same_bits) {
     for (const Strategy strategy : {Strategy::adc, Strategy::budget}) {
         TinyTraining t = tiny_training({.width = 32, .height = 24, .splats = 330});
@@ -460,7 +460,7 @@ TEST(Training, more_bad_gradients_than_one_in_a_thousand_stop_the_run) {
     }
 }
 
-// Each in one footprint: gradients of both are compared with double elsewhere.
+// Each kernel in one footprint only: gradients of both are compared with double elsewhere.
 TEST(Training, every_kernel_brings_the_loss_down_long) {
     for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel) {
         const bool exact = kernel % 2 == 1 && has_exact_footprint(kernel);

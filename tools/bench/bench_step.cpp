@@ -1,7 +1,8 @@
 #include "tools/bench/bench_step.h"
 
-#include <algorithm>
 #include <fmt/format.h>
+
+#include <algorithm>
 #include <set>
 
 #include "engine/core/rng.h"
@@ -28,7 +29,7 @@ ForwardOptions training_options() {
     return options;
 }
 
-// Rates that leave the scene as it is to the eye, whatever the number of samples.
+// Rates at which the scene looks unchanged, whatever the number of samples.
 AdamStep small_step() {
     AdamStep rates;
     rates.rate.fill(1e-7f);
@@ -97,12 +98,14 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Buffers are made for them, so they are few; the counts of an iteration are for the ones named.
+// Buffers are really allocated for kSplats, so these are few; the counts of an iteration are those
+// for kNamedSplats.
 constexpr std::size_t kSplats = 20'000;
 constexpr int kDegree = 3, kSide = 256;
 constexpr double kNamedSplats = 1e6, kNamedPixels = 1e6, kIntersectionsOfASplat = 6;
 
-// Frames of every degree that training comes by, with room for huge splats, long lists and depth.
+// Frames at every degree that training passes through, with room for huge splats, long lists and
+// depth.
 void compile_frames(Device& device) {
     const Camera camera = bench_camera(glm::dvec3(0, 0, 4), true, kSide, kSide);
     for (int degree = 0; degree < kDegree; ++degree)

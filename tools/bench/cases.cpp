@@ -5,6 +5,7 @@
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstring>
@@ -109,7 +110,7 @@ struct Planned {
     EffectPlan plan;
 };
 
-// As darb render draws it.
+// Renders as `darb render` does.
 Planned planned(const SplatModel& model, const Camera& camera) {
     Planned p{model, camera, plan_rendering(model, {bench_view(camera, "view")}, {})};
     apply_plan(p.plan, p.model);
@@ -208,7 +209,7 @@ std::vector<std::uint32_t> random_words(std::uint32_t count, std::uint32_t bound
     return words;
 }
 
-// The samples of the native work, taken after the device's; same: whether the results are.
+// Takes the samples of the native work, after the device's. same: whether the results agree.
 Yardstick yardstick(const std::string& pass, const BenchResult& result, const Sampling& sampling,
                     bool same, const std::function<double()>& native) {
     std::vector<double> ms;
@@ -311,8 +312,8 @@ std::vector<BenchCase> sort_cases() {
 
 }  // namespace darb
 
-// From starting the command to the first picture on disk: darb render of one view of biker, as a
-// process of its own, with shader caches in a folder of their own.
+// The time from starting the command to the first picture on disk: `darb render` of one view of
+// biker, as a separate process with shader caches in a separate folder.
 
 extern char** environ;
 
@@ -324,7 +325,7 @@ namespace fs = std::filesystem;
 
 constexpr int kStarts = 5;
 
-// Removed with everything in it at the end.
+// A folder that is removed with its content at the end.
 class ScratchFolder {
   public:
     ScratchFolder() {
@@ -345,7 +346,7 @@ class ScratchFolder {
     fs::path path_;
 };
 
-// The caches of Mesa, of NVIDIA's driver and of darb itself go to `caches`.
+// Directs the caches of Mesa, of NVIDIA's driver and of darb itself to `caches`.
 std::vector<std::string> environment(const fs::path& caches) {
     const std::vector<std::string> names = {"XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR",
                                             "__GL_SHADER_DISK_CACHE_PATH"};
@@ -451,7 +452,7 @@ namespace {
 constexpr std::size_t kStepSplats = 100'000;
 constexpr int kStepDegree = 3;
 
-// A sample is a step in each way, one after the other; the case's time is that of both.
+// A sample is one step in each way, one after the other; the case's time is their sum.
 BenchResult measure(Device& device, int width, int height, const BenchOptions& options) {
     const Camera camera = bench_camera(glm::dvec3(0, 0, 4), true, width, height);
     BenchStep frame(device, random_scene(kStepSplats, kStepDegree), camera);
@@ -526,7 +527,7 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     TrainOptions train;
     train.iterations = kScheduled;
-    train.resolution_ramp = false;  // what is measured are steps of whole photos
+    train.resolution_ramp = false;  // steps on whole photos are to be measured
     if (options.plan_training) options.plan_training(dataset, photos, train);
     train.densify_until = std::min(one.after, Schedule(train).rounds.end);
     Trainer trainer(device, dataset, photos, initial_model(dataset, train), train);
@@ -546,7 +547,7 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     effects.antialias = train.antialias;
     const BlendFigures blend = measure_blend(device, model, some_cameras(dataset, kYardstickViews),
                                              effects, options.sampling);
-    // The steps' own means; evaluated splat-pixels follow the intersections.
+    // The means over these steps; evaluated splat-pixels are proportional to intersections.
     const double scale = result.counts.intersections / std::max(blend.counts.intersections, 1.0);
     result.counts.evaluated = scale * blend.counts.evaluated;
     result.contributing = scale * blend.contributing;
@@ -559,7 +560,7 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     return result;
 }
 
-// What tools/lab/gpu_model.py estimates. Rates so small that the scene stays as it is.
+// Measures what tools/lab/gpu_model.py estimates, at rates so small that the scene does not change.
 BenchResult measure_filled(Device& device, const DeviceRates& rates, const BenchOptions& options) {
     Dataset dataset;
     std::vector<ImageU8> photos;
@@ -639,8 +640,8 @@ std::vector<BenchCase> train_cases(bool full) {
 
 namespace {
 
-// Every choice of one group on the tuner's scene, a row each; the case's own figures are those of
-// the one that runs on this device.
+// Every choice in one group on the tuner's scene, one row each; the case's own figures are those of
+// the choice that this device uses.
 BenchResult measure_choices(Device& device, const std::string& name, const Sampling& sampling) {
     const std::vector<TuningGroup> groups = tuning_groups(device.info());
     const auto group = std::find_if(groups.begin(), groups.end(),

@@ -1,6 +1,7 @@
 #include "tools/bench/growth.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,7 +18,7 @@ namespace darb {
 
 namespace {
 
-// No view-dependent colour: of 3 million splats it would be most of the memory.
+// No view-dependent colour, which would take most of the memory with 3 million splats.
 constexpr int kShDegree = 0;
 constexpr std::uint32_t kFrameSplats = 100'000, kIterationSplats = 30'000;  // where pixels vary
 constexpr int kWidth = 1280;                                                // where splats vary
@@ -149,7 +150,7 @@ PlotSeries series(const std::string& name, const std::vector<GrowthPoint>& point
     return s;
 }
 
-// What stays the same while the splats or the pixels vary, as the page says it.
+// What is constant while the splats or the pixels vary, as text for the page.
 std::string held_text(const std::vector<GrowthCurve>& curves, const std::string& name) {
     std::string text;
     for (const GrowthCurve& curve : curves) {
@@ -169,7 +170,7 @@ Plot log_plot(const std::string& title, const std::string& x_label) {
     return plot;
 }
 
-// The passes of one curve against what varies.
+// The passes of one curve, over what varies.
 Plot pass_plot(const GrowthCurve& curve) {
     Plot plot = log_plot(fmt::format("Passes, {} by {}", curve.name, curve.by), curve.by);
     if (curve.points.empty()) return plot;

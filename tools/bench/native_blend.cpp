@@ -15,11 +15,11 @@ namespace {
 
 constexpr int kBlockSide = 8, kBlockPixels = 64;
 constexpr std::uint32_t kBlocks = 4;
-constexpr int kBatch = 8;  // splats between two looks whether every pixel has ended, as on a device
+constexpr int kBatch = 8;  // splats between checks whether every pixel has ended, as on a device
                            // with 8 lanes
 constexpr float kAlphaMax = static_cast<float>(ALPHA_MAX);
 
-/// The intersections of a tile's list that touch a block.
+/// The intersections in a tile's list that touch a block.
 struct Hits {
     std::vector<std::uint32_t> splat, number;  // number: 1 + the place in the list
 };
@@ -33,7 +33,7 @@ Block block_at(const BlendFrame& f, std::uint32_t tile, std::uint32_t block) {
             tile / f.tiles_x * TILE_SIZE + (block >> 1) * kBlockSide};
 }
 
-// What the loops of one instruction set work on.
+// The arguments of the loops of one instruction set.
 struct Work {
     const BlendFrame& frame;
     BlendedImage* image;
@@ -119,7 +119,7 @@ BlendFrame download_frame(const ForwardOptions& options, const Frame& frame, con
     if (k.form != KERNEL_FORM_GAUSSIAN || options.evaluation == EVALUATION_BUILTIN ||
         options.storage != STORAGE_FLOAT32 || options.depth_order == DEPTH_ORDER_PIXEL ||
         k.degree >= static_cast<int>(f.polynomial.size()))
-        throw Error("native blending", "knows Gaussian splats in float32 alone",
+        throw Error("native blending", "supports only Gaussian splats in float32",
                     "Measure a scene of the Gaussian kernel at the default accuracy.");
     for (std::size_t i = 0; i < f.polynomial.size(); ++i)
         f.polynomial[i] = static_cast<float>(k.c[i]);

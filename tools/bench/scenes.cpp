@@ -38,8 +38,7 @@ SplatModel random_scene(std::size_t splats, int sh_degree) {
 SplatModel filled_scene(std::size_t splats) {
     SplatModel model = random_scene(splats);
     Pcg32 random(2, 100);
-    const double half = 0.99 * std::tan(0.125 * std::numbers::pi);  // half the picture, at distance
-                                                                    // 1
+    const double half = 0.99 * std::tan(0.125 * std::numbers::pi);  // half the width, at distance 1
     for (std::size_t i = 0; i < splats; ++i) {
         const double distance = random.uniform(3, 5);
         model.position[3 * i] = static_cast<float>(random.uniform(-half, half) * distance);

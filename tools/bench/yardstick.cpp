@@ -39,8 +39,8 @@ void add_error(const std::vector<float>& a, const std::vector<float>& b, double&
     }
 }
 
-// One camera: its frame on the device, and the same natively. The backward blend is that of
-// Backward, without the passes after it.
+// One camera: its frame on the device, and the same computed natively. The backward blend is
+// that of Backward, without the passes after it.
 class Side {
   public:
     Side(Device& device, const SplatModel& model, const Camera& camera,

@@ -1,9 +1,10 @@
 #include "tools/cost/accuracy_cost.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fmt/format.h>
 #include <functional>
 #include <memory>
 
@@ -77,7 +78,7 @@ double since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// What the samples of one row are gathered in, a value a repeat.
+/// Collects the samples of one row, one value per repeat.
 struct Samples {
     std::vector<double> frame;
     std::vector<std::pair<std::string, std::vector<double>>> passes;
@@ -102,8 +103,8 @@ class Measurement {
 
     double truth_seconds() const { return truth_seconds_; }
 
-    /// Warms up, fills errors and photos of rows[first ...], then times all of them and balanced,
-    /// turn by turn. Returns the repeats.
+    /// Warms up, fills errors and photos of rows[first ...], then times all of them and balanced in
+    /// turn. Returns the number of repeats.
     int run(std::vector<CostRow>& rows, size_t first, const CostPlan& plan, size_t& group_size,
             double& balanced_ms);
 
@@ -135,7 +136,7 @@ void Measurement::judge(CostRow& row, Renderer& renderer) {
         row.photo_psnr_db = evaluation.psnr_db;
         row.photo_ssim = evaluation.ssim;
     }
-    if (balanced_.empty()) balanced_ = pictures;  // the first row of all
+    if (balanced_.empty()) balanced_ = pictures;  // the very first row
     row.same_as_balanced = true;
     for (size_t v = 0; v < pictures.size(); ++v)
         row.same_as_balanced &= pictures[v].data == balanced_[v].data;
@@ -186,7 +187,7 @@ int Measurement::run(std::vector<CostRow>& rows, size_t first, const CostPlan& p
         while (repeat < plan.most_repeats &&
                (repeat < plan.least_repeats || since(start) < plan.seconds / groups)) {
             time_once(balanced, of_balanced);
-            for (size_t i = 0; i < renderers.size(); ++i) {  // each turn begins elsewhere
+            for (size_t i = 0; i < renderers.size(); ++i) {  // each turn begins with another row
                 const size_t r = (i + static_cast<size_t>(repeat)) % renderers.size();
                 time_once(*renderers[r], samples[begin + r]);
             }
@@ -301,7 +302,7 @@ struct Predicted {
     double ms = 0, mse = 0;
 };
 
-/// What a choice alone does to time and squared error.
+/// The effect of a single choice on time and squared error.
 struct Effect {
     int choice = 0;
     double ratio = 1, added = 0;
@@ -318,7 +319,7 @@ std::vector<std::vector<Effect>> effects_of(const std::vector<CostRow>& rows) {
     return effects;
 }
 
-/// The rows of the least `key` for their time, fastest first.
+/// The rows with the smallest `key` for their time, fastest first.
 template <class Row, class Ms, class Key>
 std::vector<size_t> front_of(const std::vector<Row>& rows, const Ms& ms, const Key& key) {
     std::vector<size_t> order(rows.size());
@@ -332,7 +333,7 @@ std::vector<size_t> front_of(const std::vector<Row>& rows, const Ms& ms, const K
     return front;
 }
 
-/// Whether measuring again would not turn the two around.
+/// Whether a second measurement would leave the order of the two as it is.
 bool is_faster(const CostRow& row, const CostRow& other) {
     return std::max(row.ms.high, row.ms.median) <
            (other.ms.low > 0 ? std::min(other.ms.low, other.ms.median) : other.ms.median);
@@ -373,7 +374,7 @@ std::vector<Accuracy> promising_combinations(const std::vector<CostRow>& rows, s
     std::vector<Predicted> all{{Accuracy{}, rows[0].ms.median, rows[0].error.mse}};
     const std::vector<std::vector<Effect>> effects = effects_of(rows);
     for (int s = 0; s < kAccuracyCount; ++s) {
-        // Another footprint is another model, and no way to a better picture of this one.
+        // Another footprint makes another model, not a better picture of this one.
         if (s == kFootprint) continue;
         std::vector<Predicted> next;
         for (const Predicted& p : all)
@@ -397,7 +398,7 @@ std::vector<Accuracy> promising_combinations(const std::vector<CostRow>& rows, s
     return spread;
 }
 
-// On the front is what is faster than all that is better, by more than the spread of the times.
+// A row is on the front if it is faster than all better rows, by more than the spread of the times.
 void mark_fronts(std::vector<CostRow>& rows) {
     const auto mark = [&](const auto& key, bool CostRow::*on) {
         for (const size_t i : front_of(rows, milliseconds, key))

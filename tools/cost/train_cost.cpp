@@ -1,6 +1,7 @@
 #include "tools/cost/train_cost.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -35,8 +36,8 @@ struct TrainedRun {
     SplatModel model;
 };
 
-// What training does beside the accuracy settings that changes a gradient or a picture, each turned
-// the other way.
+// What training does besides the accuracy settings that changes a gradient or a picture, each
+// reversed.
 std::vector<TrainCostRow> departures(const TrainOptions& options) {
     const Schedule schedule(options);
     std::vector<TrainCostRow> rows;
@@ -162,12 +163,12 @@ std::vector<size_t> views_of(const Dataset& dataset, bool test) {
     if (views.empty())
         throw Error(dataset.root.string(),
                     test ? "holds out no photo to measure on" : "has no photo to train on",
-                    "Use a data set of two photos or more.");
+                    "Use a data set with at least two photos.");
     return views;
 }
 
-/// Gradients of a trained scene for the losses of some photos, against those in double precision at
-/// the most accurate settings, which are computed once for each footprint.
+/// Gradients of a trained scene for the losses of some photos, compared with those in double
+/// precision at the most accurate settings, which are computed once for each footprint.
 class GradientErrors {
   public:
     GradientErrors(Device& device, SplatModel model, const Dataset& dataset,
@@ -256,8 +257,8 @@ class GradientErrors {
     std::vector<Photo> photos_;
 };
 
-// [row][seed]. The first run is this process's own where it is the first rank, and the only one
-// whose splats are kept.
+// [row][seed]. On the first rank, the first run is done by this process, and only its splats are
+// kept.
 std::vector<std::vector<TrainedRun>> train_by_turns(
     Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
     const TrainOptions& options, const TrainCostPlan& plan, const std::vector<TrainCostRow>& rows,
@@ -298,7 +299,7 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
                                    const TrainOptions& options, const TrainCostPlan& plan,
                                    const std::function<void(const std::string&)>& progress) {
     TrainCostResult result;
-    views_of(dataset, false);  // an Error before any photo is read
+    views_of(dataset, false);  // gives an Error before any photo is read
     views_of(dataset, true);
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     if (plan.ranks && plan.ranks->count() > 1) {

@@ -1,9 +1,10 @@
 // A comparison as text and as JSON.
 #include "tools/paper/compare_report.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <optional>
 
 #include "engine/kernels/kernel_family.h"
@@ -103,7 +104,7 @@ Json paper_json(const std::string& dataset) {
 
 namespace {
 
-// A line a kernel, with a star where it is the best; below it, over several seeds, the range.
+// One line per kernel, with a star where it is the best; with several seeds, the range below it.
 std::string kernel_lines(const Comparison& c, const ComparedDataset& dataset, int iteration,
                          const std::vector<Column>& columns) {
     std::vector<std::vector<OverSeeds>> values(columns.size());
@@ -177,8 +178,8 @@ nlohmann::json comparison_json(const Comparison& c) {
             {"kernels", c.kernels},    {"datasets", datasets},  {"means", means_json(c)}};
 }
 
-// The page of `darb compare`: per data set the tables of the paper, its curves, the paper's own
-// numbers, what blending takes, and crops.
+// The page of `darb compare`: per data set the paper's tables, the curves, the paper's own figures,
+// the cost of blending, and crops.
 
 namespace {
 
@@ -232,7 +233,7 @@ std::string means_row(const std::string& name, const std::vector<Column>& column
     return html + "</tr>\n";
 }
 
-/// The means of one group of data sets; the last row says how many each column covers.
+/// The means of one group of data sets; the last row tells how many data sets each column covers.
 std::string means_table(const Comparison& c, const Means& means,
                         const std::vector<Column>& columns) {
     std::vector<Marks> marks;
@@ -274,7 +275,7 @@ const ComparedRun* first_run(const Comparison& c, const ComparedDataset& dataset
     return nullptr;
 }
 
-/// One curve a kernel, of the first seed.
+/// One curve per kernel, from the first seed.
 template <class Points>
 std::string plot(const Comparison& c, const ComparedDataset& dataset, Plot frame, bool dots,
                  const Points& points) {
@@ -382,7 +383,7 @@ std::string crop_rows(const Comparison& c, const ComparedDataset& dataset) {
                      html;
 }
 
-/// The paper's Figure 2: what one and the same covariance looks like in each kernel.
+/// The paper's Figure 2: how one covariance looks with each kernel.
 std::string splat_figure(const Comparison& c) {
     std::vector<Captioned> pictures;
     Plot profile{"Splats of one covariance", "distance (standard deviations)", "weight", {}};

@@ -1,8 +1,9 @@
 #include "tools/paper/compare_runs.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <set>
 
 #include "engine/core/error.h"
@@ -66,7 +67,7 @@ BlendStatistics measure_blending(Device& device, const SplatModel& model,
     return sum;
 }
 
-// Output folders of training runs: what state they are in, and their numbers.
+// Reads output folders of training runs: their state and their figures.
 
 namespace {
 
@@ -85,7 +86,7 @@ std::string differences(const Json& there, const Json& wanted) {
     return text;
 }
 
-// JSON has NaN and infinity as null.
+// JSON has null in place of NaN and infinity.
 double number(const Json& record, const char* key) {
     const auto at = record.find(key);
     return at != record.end() && at->is_number() ? at->get<double>() : std::nan("");
@@ -100,7 +101,7 @@ ComparedAt evaluation_of(const Json& e, const fs::path& folder) {
     at.splats = e.at("splats");
     if (const auto arc = e.find("arc"); arc != e.end()) at.arc_db = number(*arc, "psnr_db");
     const fs::path pictures = folder / "held_out" / std::to_string(at.iteration);
-    std::set<std::string> used;  // in the order in which the run named them
+    std::set<std::string> used;  // in the order in which the run named its files
     for (const Json& v : e.at("views"))
         at.views.push_back({v.at("name"), number(v, "psnr_db"), number(v, "ssim"), std::nullopt,
                             pictures / picture_name(v.at("name"), used)});

@@ -39,7 +39,7 @@ float half_to_float(std::uint16_t h) {
     return sign * std::ldexp(static_cast<float>(whole), std::max(exponent, 1) - 25);
 }
 
-/// Bytes of one value of a type that is read; 0 for others.
+/// Bytes of a value of a supported type; 0 for other types.
 std::size_t size_of(const std::string& type) {
     if (type == "F32") return 4;
     if (type == "F16" || type == "BF16") return 2;
@@ -123,7 +123,8 @@ struct Plane {
 };
 
 struct Row {
-    int slice, index, pool, stride, padding;  // index: of features.N; slice: of the package
+    int slice, index, pool, stride, padding;  // index: that of features.N; slice: that of the lpips
+                                              // package
     bool kept;
 };
 
@@ -259,7 +260,7 @@ Tensors read_all(const std::vector<std::filesystem::path>& files) {
     for (const std::filesystem::path& file : files) {
         Tensors more = read_safetensors(file);
         all.merge(more);
-        if (!more.empty())  // what was there already
+        if (!more.empty())  // names that occurred before are left over
             throw Error(file.string(),
                         "has tensor " + more.begin()->first + ", as a file before it has",
                         "Give the weights of one network: two take two runs of darb compare, the "

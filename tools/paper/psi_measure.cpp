@@ -14,7 +14,7 @@ namespace darb {
 
 namespace {
 
-constexpr double kGaussSupport = 36;  // q at which the Gaussian is cut here: e^-18
+constexpr double kGaussSupport = 36;  // here the Gaussian is cut at this q: e^-18
 constexpr int kMaximumSamples = 4000;
 
 double support_of(const DerivedKernel& kernel) {
@@ -39,7 +39,7 @@ glm::dmat3 random_covariance(Pcg32& rng) {
     }
 }
 
-/// One experiment: {xx, xy, yy} of the weighted 2D covariance over those of the 3D one.
+/// One experiment: {xx, xy, yy} of the weighted 2D covariance, divided by those of the 3D one.
 std::array<double, 3> grid_ratios(const DerivedKernel& kernel, const glm::dmat3& covariance,
                                   const glm::dvec3& mean, int cells) {
     const double support = support_of(kernel);
@@ -81,14 +81,14 @@ PsiSpread spread(std::vector<double> values) {
             n > 1 ? std::sqrt(squares / static_cast<double>(n - 1)) : 0.0};
 }
 
-/// Integral of f over [from, to] with nodes that crowd at `to`, where footprints have a root.
+/// Integral of f over [from, to], with nodes that crowd at `to`, where footprints fall like a root.
 template <class F>
 double integrate(double from, double to, const F& f) {
     return 2 * (to - from) *
            integrate_unit([&](double x) { return x * f(to - (to - from) * x * x); });
 }
 
-/// Relative L2 and largest difference of `shown` from the projection; `shown` has its edge at
+/// Relative L2 and largest difference of `shown` from the projection; the edge of `shown` is at
 /// `edge`.
 template <class F>
 FootprintDistance distance(const DerivedKernel& kernel, double edge, const F& shown) {

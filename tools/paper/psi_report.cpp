@@ -1,6 +1,7 @@
 #include "tools/paper/psi_report.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>

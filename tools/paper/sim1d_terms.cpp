@@ -83,7 +83,7 @@ struct Quadric {
     }
 };
 
-/// Everything that a term leaves at its samples.
+/// Everything that a term contributes at its samples.
 struct Rows {
     float *w, *slope_z, *sum;
 };

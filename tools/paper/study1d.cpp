@@ -1,6 +1,7 @@
 #include "tools/paper/study1d.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -25,7 +26,7 @@ bool has_failed(const Fit1d& fit, double mean_square) {
     return !std::isfinite(fit.loss) || fit.loss >= kFailedShare * mean_square;
 }
 
-/// The kept step at which the loss first is at most target.
+/// The first recorded step at which the loss is at most `target`.
 std::optional<int> step_of(const Fit1d& fit, const std::vector<int>& steps, double target) {
     for (std::size_t i = 0; i < fit.losses.size(); ++i)
         if (fit.losses[i] <= target) return steps[i];
@@ -77,10 +78,11 @@ Study1dResult study_1d(const Study1dOptions& options,
                "{} seeds", options.seeds);
     for (const int k : options.kernels)
         if (!Terms1d::draws(k))
-            throw Error(fmt::format("kernel {}", kernel_1d_name(k)),
-                        "has several pulses, or falls to its edge as no whole power up to the "
-                        "fourth, which this study does not draw",
-                        "Leave it out.");
+            throw Error(
+                fmt::format("kernel {}", kernel_1d_name(k)),
+                "has several pulses, or falls to its edge other than by a whole power up to the "
+                "fourth, which this study does not draw",
+                "Leave it out.");
     const auto start = std::chrono::steady_clock::now();
     Study1dResult result{options, {}, {}, 0};
     std::vector<std::vector<float>> targets;
@@ -105,7 +107,7 @@ Study1dResult study_1d(const Study1dOptions& options,
     std::vector<Fit1d> fits(tasks);
     std::mutex mutex;
     std::size_t done = 0;
-    // Neighbouring tasks are seeds of one row, so that threads end together.
+    // Neighbouring tasks are seeds of one row, so that threads end at about the same time.
     reference::parallel_for(tasks, options.threads, [&](std::size_t t) {
         const Study1dRow& row = result.rows[t / seeds];
         fits[t] = fit_1d(row.kernel, targets[t / seeds / counts / kernels], row.primitives,
@@ -128,8 +130,8 @@ Study1dResult study_1d(const Study1dOptions& options,
     return result;
 }
 
-// The study as text, JSON and a page. The figures are grids like the paper's: a row a kernel, a
-// column a number of primitives.
+// The study as text, JSON and a page. The figures are grids like the paper's: one row per kernel,
+// one column per number of primitives.
 
 namespace {
 
@@ -223,8 +225,8 @@ std::string curves(const Study1dResult& result, std::size_t signal) {
     return "<div class='plots'>" + html + "</div>\n";
 }
 
-/// How many kernels have a lesser median: 0 for the best, and for all that tie with it. A kernel
-/// whose every run failed comes last and is never the best.
+/// How many kernels have a smaller median: 0 for the best, and for all that tie with it. A kernel
+/// whose runs all failed comes last, and is never the best.
 std::vector<std::size_t> ranks(const Study1dResult& result, std::size_t signal, std::size_t n) {
     const std::size_t kernels = result.options.kernels.size();
     const auto loss = [&](std::size_t k) { return result.row(signal, k, n).median; };

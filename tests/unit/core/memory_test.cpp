@@ -1,5 +1,5 @@
-// How much memory is free, by made-up files of Linux: of a machine, and of control groups of both
-// versions, as a container has them.
+// How much memory is free, according to made-up Linux files: on a machine, and in control groups of
+// both versions, as in a container.
 #include "engine/core/memory.h"
 
 #include <gtest/gtest.h>
@@ -101,7 +101,7 @@ TEST_F(FreeMemory, version_1_of_control_groups_has_other_names) {
     EXPECT_EQ(free_mib(), 50U);
 }
 
-// Its files are at the top, the name is the one outside.
+// Its files are at the top, but its name is the one outside.
 TEST_F(FreeMemory, a_container_of_version_1_finds_its_own_group_at_the_top) {
     machine_has(100'000);
     put("proc/self/cgroup", "4:memory:/docker/0123abcd");

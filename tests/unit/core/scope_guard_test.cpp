@@ -1,4 +1,4 @@
-// What a scope puts back, and which failure is told where putting back fails, too.
+// What a scope restores, and which failure is reported where restoring fails, too.
 #include "engine/core/scope_guard.h"
 
 #include <gtest/gtest.h>

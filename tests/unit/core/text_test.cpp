@@ -1,4 +1,4 @@
-// What names from files become on a terminal and in Python's source.
+// How names from files appear on a terminal and in Python source.
 #include "engine/core/text.h"
 
 #include <gtest/gtest.h>

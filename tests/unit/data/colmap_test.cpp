@@ -243,7 +243,7 @@ TEST(ColmapProject, photos_are_found_by_backslashes_and_other_extensions) {
     EXPECT_EQ(dataset.views.at(0).mask, folder / "masks/left/a.png");
 }
 
-// Names of another machine, names that repeat the folder, and photos that lie with the model.
+// Names from another machine, names that repeat the folder, and photos that lie with the model.
 TEST(ColmapProject, photos_are_found_by_the_end_of_their_names_with_a_note) {
     const Camera camera{.width = 8, .height = 6, .fx = 20, .fy = 20, .cx = 4, .cy = 3};
     const auto set_of = [&](const std::vector<std::string>& names,
@@ -287,7 +287,7 @@ TEST(ColmapProject, photos_are_found_by_the_end_of_their_names_with_a_note) {
     }
 }
 
-// Each remedy that an error of a data set names, done as it says.
+// Follows each remedy that an error about a data set names, and checks that it helps.
 TEST(ColmapProject, remedies_that_errors_name_work_as_typed) {
     const auto after = [](const std::string& text, const std::string& head) {
         const std::size_t begin = text.find(head);
@@ -329,8 +329,9 @@ TEST(ColmapProject, remedies_that_errors_name_work_as_typed) {
     std::fill(depth.data.begin(), depth.data.end(), 1.0f);
     write_depth_png(folder / "depths/first.png", depth, kMillimetre);
     error = error_of([&] { load_dataset(folder); });
-    EXPECT_NE(error.find("Name it as its photo in " + (folder / "images").string() + ", with .png"),
-              std::string::npos);
+    EXPECT_NE(
+        error.find("Name it like its photo in " + (folder / "images").string() + ", with .png"),
+        std::string::npos);
     std::filesystem::rename(folder / "depths/first.png", folder / "depths/a.png");
     error = error_of([&] { load_dataset(folder); });  // one track does not tell the scale
     EXPECT_NE(error.find("--depth-scale"), std::string::npos) << error;
@@ -442,7 +443,7 @@ TEST(ColmapProject, frames_and_rigs_say_the_poses_as_in_colmap) {
     write(false, right, true);
     write_file_atomic(folder / "sparse/0/frames.txt",
                       std::string("9 7 1 0 0 0 0 0 3 2 CAMERA 1 1 CAMERA 1 2\n"));
-    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("is of camera 2, but of camera 1"),
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("has camera 2, but camera 1"),
               std::string::npos);
     write_file_atomic(folder / "sparse/0/frames.txt",
                       std::string("9 8 1 0 0 0 0 0 3 2 CAMERA 1 1 CAMERA 2 2\n"));
@@ -460,7 +461,7 @@ TEST(ColmapProject, cameras_of_a_transforms_file_beside_it_are_compared) {
         write_png(folder / "images" / views[i].name, ImageU8(8, 6, 3));
     }
     write_colmap_binary(folder / "sparse/0", views, {});
-    // The same cameras, the world turned, scaled by 2 and moved.
+    // The same cameras, with the world turned, scaled by 2 and moved.
     const auto note = [&](double focal, std::size_t odd, bool turned) {
         std::string frames;
         for (std::size_t i = 0; i < views.size(); ++i) {

@@ -74,8 +74,8 @@ TEST(ColmapText, bad_lines_are_errors_that_name_them) {
               std::string::npos);
 }
 
-// A text cut at the end of a line is a shorter model; anywhere else it may be an error. Never a
-// crash.
+// A text cut at the end of a line is a shorter model; cut anywhere else, it may give an error, but
+// never a crash.
 TEST(ColmapText, truncated_anywhere_is_a_shorter_model_or_an_error) {
     const std::string cameras = "1 PINHOLE 8 6 50 50 4 3\n2 OPENCV 8 6 50 50 4 3 0.1 0 0 0\n",
                       images = "1 1 0 0 0 1 2 3 1 a.jpg\n1 2 -1\n2 1 0 0 0 1 2 3 2 b.jpg\n\n",

@@ -69,7 +69,7 @@ std::vector<std::byte> from_hex(const std::string& text) {
     return bytes;
 }
 
-/// A TIFF of 3 x 2 floats in strips of one row, little-endian; the fields of `more` beside.
+/// A little-endian TIFF of 3 x 2 floats in strips of one row, with the additional fields `more`.
 std::vector<std::byte> float_tiff(const std::vector<float>& values,
                                   const std::map<std::uint16_t, std::uint32_t>& more = {}) {
     std::map<std::uint16_t, std::uint32_t> fields{{256, 3}, {257, 2}, {258, 32}, {259, 1}, {277, 1},
@@ -169,7 +169,7 @@ TEST(DepthFiles, what_is_no_depth_is_refused_by_name) {
     refused("text.npy", "");
 }
 
-/// Photos a.png and b.png of 8 x 6 px, a COLMAP model of them or a transforms file.
+/// Photos a.png and b.png of 8 x 6 px, with a COLMAP model or a transforms file.
 fs::path write_set(bool colmap, const std::string& more = "", const std::string& of_file = "") {
     const fs::path folder = test_folder();
     std::vector<View> views(2);
@@ -234,7 +234,8 @@ TEST(Depths, that_a_network_estimated_inversely_are_left_out_with_a_note) {
         << dataset.notes.back();
 }
 
-// instant-ngp: integer_depth_scale is of integers alone; nerfstudio: poses may have been scaled.
+// instant-ngp: integer_depth_scale applies to integers only; nerfstudio: poses may have been
+// scaled.
 TEST(Depths, of_other_dialects_of_transforms_have_their_scale) {
     const std::string scale = R"("integer_depth_scale": 1e-4, )";
     fs::path set = write_set(false, R"("depth_path": "lidar/x.png", )", scale);
@@ -283,7 +284,7 @@ TEST(Depths, without_a_photo_or_of_another_shape_are_refused) {
     const fs::path set = write_set(false);
     write_depth_png(set / "depths/c.png", ramp(8, 6), kMillimetre);
     std::string error = error_of([&] { load_dataset(set); });
-    EXPECT_NE(error.find("c.png: is the depth of no photo"), std::string::npos) << error;
+    EXPECT_NE(error.find("c.png: belongs to no photo"), std::string::npos) << error;
     write_png(set / "images/c.png", ImageU8(8, 6, 3));  // a photo that is no view
     const Dataset dataset = load_dataset(set);
     View view = dataset.views[0];
@@ -338,7 +339,7 @@ TEST(Depths, of_a_picture_are_compared_in_metres_where_splats_are_and_something_
     EXPECT_FALSE(compare_depth(rendered, measured, 2));
 }
 
-// World units that no metre is: points that a photo saw, at 2.5 times what was measured.
+// World units that are not metres: points that a photo saw, at 2.5 times the measured depth.
 TEST(Depths, the_scale_of_the_scene_follows_from_points_that_photos_saw) {
     const fs::path set = write_set(true);
     write_depth_png(set / "depths/a.png", ramp(8, 6), kMillimetre);

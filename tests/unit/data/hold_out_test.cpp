@@ -1,4 +1,4 @@
-// Which views are held out: every so many, an arc, both, and what a source says of its own.
+// Which views are held out: every N-th, an arc, both, and what a source itself states.
 #include "engine/data/hold_out.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ View looking(const glm::dvec3& at, const glm::dvec3& to, int name) {
 
 constexpr double kTurn = 6.283185307179586;
 
-// count views on `share` of a turn around (5, 5, 0), by name out of order.
+// `count` views on a share of a turn around (5, 5, 0), with names out of order.
 std::vector<View> ring(int count, double share = 1) {
     std::vector<View> views;
     for (int i = 0; i < count; ++i) {
@@ -123,7 +123,7 @@ TEST(HoldOut, few_views_leave_one_to_train_on) {
     EXPECT_NE(two[0].is_test, two[1].is_test);
 }
 
-// Views with photos in a folder: text[i] is what the photo of view i holds.
+// Views with photos in a folder: text[i] is the content of the photo of view i.
 std::vector<View> with_photos(std::vector<View> views, const std::vector<std::string>& text) {
     const auto folder = test_folder();
     for (std::size_t i = 0; i < views.size(); ++i) {
@@ -157,7 +157,7 @@ TEST(HoldOut, views_of_one_photo_are_on_one_side) {
     EXPECT_NE(note.find("3 views repeat"), std::string::npos) << note;
     EXPECT_NE(note.find("1003 repeats 1000"), std::string::npos) << note;
     EXPECT_NE(note.find("2 of the repeats are held out, 1 trained on"), std::string::npos) << note;
-    // Every eighth photo: 0, 9 and 18 of the rows, as row 3 is no photo of its own and 12 neither.
+    // Every eighth photo: rows 0, 9 and 18, because rows 3 and 12 repeat photos.
     for (std::size_t i = 0; i < repeated.size(); ++i)
         EXPECT_EQ(repeated[i].is_test, i == 0 || i == 3 || i == 12 || i == 9 || i == 18) << i;
 }
@@ -178,7 +178,7 @@ TEST(HoldOut, repeats_follow_an_arc_and_the_sources_own_views) {
         EXPECT_EQ(arc[i].in_arc, arc[first[i]].in_arc) << i;
         EXPECT_EQ(own[i].is_test, first[i] == first[1]) << i;
     }
-    // A test list that repeats the training photos stays, or nothing would be left to train on.
+    // A test list that repeats all training photos is kept, or nothing would be left to train on.
     all[0].is_test = all[1].is_test = true;
     const std::string note = mark_held_out(all, {});
     EXPECT_NE(note.find("no measure of new views"), std::string::npos) << note;

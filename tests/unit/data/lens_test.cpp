@@ -17,7 +17,7 @@ LensModel make(std::string model, std::vector<double> parameters) {
     return {std::move(model), std::move(parameters), 640, 480};
 }
 
-/// One lens of each model, as strong as consumer and action cameras have them.
+/// One lens of each model, as strong as those of consumer and action cameras.
 std::vector<LensModel> all_models() {
     return {
         make("SIMPLE_PINHOLE", {500, 321, 239}),

@@ -1,4 +1,4 @@
-// Masks beside the photos of COLMAP models and transforms files, by every name they go by.
+// Masks beside the photos of COLMAP models and transforms files, under every name that is used.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A set of photos left/a.JPG (a PNG on disk) and b.png, a COLMAP model of it or a transforms file.
+/// Photos left/a.JPG (a PNG on disk) and b.png, with a COLMAP model or a transforms file.
 fs::path write_masked_set(bool colmap) {
     const fs::path folder = test_folder();
     std::vector<View> views(2);
@@ -69,7 +69,7 @@ TEST_P(Masks, of_which_none_is_a_photos_are_an_error_that_names_the_form) {
     write_png(set / "masks/deep/0001.png", ImageU8(8, 6, 1));
     const std::string error = error_of([&] { load_dataset(set); });
     EXPECT_EQ(error.find((set / "masks").string()), 0u) << error;
-    for (const char* part : {"of none of the 2 photos", "left/a.png for left/a.JPG", "remove the"})
+    for (const char* part : {"for any of the 2 photos", "left/a.png for left/a.JPG", "remove the"})
         EXPECT_NE(error.find(part), std::string::npos) << error;
     EXPECT_NO_THROW(load_cameras(set)) << "cameras need no masks";
 }
@@ -89,7 +89,7 @@ TEST_P(Masks, of_near_names_are_found_where_there_is_no_doubt) {
     }
     const fs::path set = write_masked_set(GetParam());
     write_png(set / "masks/right/a.png", ImageU8(8, 6, 1));
-    EXPECT_NE(error_of([&] { load_dataset(set); }).find("of none of the 2"), std::string::npos)
+    EXPECT_NE(error_of([&] { load_dataset(set); }).find("for any of the 2"), std::string::npos)
         << "another camera's";
 }
 

@@ -1,5 +1,5 @@
-// Untrusted photos: every kind of PNG and JPEG, and what is cut off, damaged or made to break a
-// decoder.
+// Untrusted photos: every kind of PNG and JPEG, and files that are cut off, damaged or made to
+// break a decoder.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -19,7 +19,7 @@ std::string refusal(std::span<const std::byte> file) {
     return error_of([&] { decode_image(file, "a photo"); });
 }
 
-/// The place of the first segment of a JPEG with that marker.
+/// Offset of the first segment with that marker in a JPEG.
 std::size_t segment(const std::vector<std::byte>& file, int marker) {
     for (std::size_t at = 2; at + 4 < file.size();) {
         if (file[at + 1] == std::byte(marker)) return at;
@@ -47,7 +47,7 @@ TEST(Photos, every_kind_of_file_is_read_with_the_channels_that_its_head_says) {
 }
 
 TEST(Photos, a_jpeg_has_the_pixels_that_were_put_in) {
-    // A slow slope: what is left is the rounding of the coefficients.
+    // A gentle slope, so that only the rounding of the coefficients is left.
     for (const bool progressive : {false, true})
         for (const int channels : {1, 3}) {
             const ImageU8 image = decode_image(test::jpeg_file({.width = 64,
@@ -111,7 +111,7 @@ TEST(Photos, a_jpeg_that_is_cut_off_is_refused_and_says_where) {
          {test::JpegKind{}, test::JpegKind{.restart = 1},
           test::JpegKind{.channels = 1, .sampling = 1}, test::JpegKind{.progressive = true}}) {
         const std::vector<std::byte> file = test::jpeg_file(kind);
-        // The end mark alone may be missing where every pixel is there.
+        // Only the end marker may be missing, where all pixels are there.
         const std::size_t complete = kind.progressive ? file.size() : file.size() - 2;
         for (std::size_t length = 0; length < complete; ++length)
             EXPECT_EQ(refusal(std::span(file).first(length)).find("a photo"), 0u) << length;

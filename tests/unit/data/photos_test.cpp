@@ -113,7 +113,7 @@ TEST(Exif, damaged_or_absent_data_means_upright) {
     }
 }
 
-// A JPEG's head: IFD0 with the place of the Exif directory, that with the place of a time.
+// The head of a JPEG: IFD0 with the offset of the Exif directory, which has the offset of a time.
 std::vector<std::byte> with_time(const std::string& time, bool little) {
     Bytes exif;
     exif.text("Exif").put('\0').put('\0').text(little ? "II" : "MM");
@@ -147,7 +147,7 @@ TEST(Photos, exif_says_when_a_photo_was_taken) {
     EXPECT_EQ(exif_time(jpeg(quarters())), "");
 }
 
-/// The focal length on 35 mm film that a photo's EXIF says.
+/// The 35 mm focal length that a photo's EXIF states.
 std::vector<std::byte> with_focal_length(std::vector<std::byte> file, int mm) {
     Bytes exif;
     exif.text("Exif").put('\0').put('\0').text("II").put<std::uint16_t>(42);
@@ -364,7 +364,7 @@ TEST(Mask, is_in_the_alpha_channel_where_that_varies) {
     EXPECT_EQ(alpha_of({0, 0, 0, 255, 255, 255, 255, 100}), Two(0, 100)) << "both";
 }
 
-/// Opaque but for one quarter, which is ignored.
+/// Opaque except for one quarter, which is ignored.
 ImageU8 mask_without(int width, int height, bool lower) {
     ImageU8 mask(width, height, 1);
     for (int y = 0; y < height; ++y)
@@ -422,7 +422,8 @@ TEST(LoadPhotos, order_is_kept_and_errors_arrive) {
 
 TEST(PhotoDetail, is_the_mean_difference_from_the_neighbours_in_training_photos) {
     const auto folder = test_folder();
-    // Stripes a pixel wide; the same with a transparent left half; stripes that are held out; grey.
+    // Stripes one pixel wide; the same with a transparent left half; stripes that are held out;
+    // plain grey.
     std::vector<View> views(4);
     for (std::size_t i = 0; i < views.size(); ++i) {
         ImageU8 image(12, 6, 4);
@@ -470,7 +471,7 @@ TEST(LoadPhotos, what_does_not_fit_into_memory_is_said_before_anything_is_read) 
         std::string::npos);
 }
 
-// What is named in place of a data set.
+// What users name in place of a data set.
 TEST(Photos, what_holds_no_cameras_is_told_with_the_way_to_them) {
     const auto folder = test_folder();
     const auto says = [&](const std::filesystem::path& name) {

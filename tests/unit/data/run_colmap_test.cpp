@@ -26,7 +26,7 @@ class PathVariable {
     std::string old_;
 };
 
-// What ends a stand-in: the folder that the undistorter makes.
+// The last command of a stand-in: makes the folder that the undistorter makes.
 const std::string kUndistorter = "if [ $1 = image_undistorter ]; then mkdir -p \"$7\"; fi\n";
 
 /// A stand-in for colmap that logs its arguments and makes what the mapper makes.
@@ -146,8 +146,8 @@ TEST(RunColmap, options_that_only_help_are_given_where_the_version_lists_them) {
     EXPECT_FALSE(has(text(recent), "Sift")) << text(recent);
 }
 
-// A colmap whose mapper finds `first` photos, and `second` where it got an option of the thorough
-// effort; it notes its commands.
+// A stand-in whose mapper finds `first` photos, or `second` where it got an option of the thorough
+// effort. It logs its commands.
 std::string few_photos(const std::string& calls, const char* first, const char* second) {
     return "if [ \"$2\" = -h ]; then echo '  --Mapper.min_num_matches arg'; exit; fi\n"
            "echo $1 >>'" +
@@ -271,7 +271,7 @@ TEST(ColmapOutput, features_are_followed_in_every_version) {
 }
 
 TEST(ColmapOutput, pairs_are_followed_in_every_version) {
-    // 3.8: the time follows on the same line when the block is done.
+    // 3.8: when the block is done, the time follows on the same line.
     EXPECT_EQ(progress_of(ColmapStep::match, 25, 300,
                           "Matching block [1/2, 1/2]~\nMatching block [1/2, 1/2] in 4.332s\n"
                           "Matching block [1/2, 2/2]~\nMatching block [1/2, 2/2] in 5.1s\n"

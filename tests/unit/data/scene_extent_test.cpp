@@ -1,4 +1,4 @@
-// The extent of a scene: of what is trained on, and something finite where cameras say nothing.
+// The extent of a scene: that of the training views, and a finite value where cameras say nothing.
 #include <gtest/gtest.h>
 
 #include "engine/data/dataset.h"

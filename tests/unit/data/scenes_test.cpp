@@ -142,7 +142,7 @@ TEST(RealScenes, folder_scaled_by_divisor_and_width) {
     }));
 }
 
-/// A data set that was read wrong, and one of the same photos that is right.
+/// A data set with something wrong, and a correct one with the same photos.
 struct FaultCase {
     const char *set, *right;
     bool depths;
@@ -167,7 +167,7 @@ INSTANTIATE_TEST_SUITE_P(
         return name;
     });
 
-// Photos, masks, depths and poses are those of the set that is right, so its pictures are, too.
+// Photos, masks, depths and poses equal those of the correct set, and so do its pictures.
 TEST_P(ImportCase, is_read_as_the_one_that_is_right) {
     const auto cases = test_data() / "cases";
     const FaultCase set = GetParam();

@@ -1,4 +1,4 @@
-// Masks of photos that colmap straightened, against its lens written out.
+// Masks of photos that COLMAP undistorted, checked against its lens written out.
 #include "engine/data/masks.h"
 
 #include <cmath>
@@ -15,7 +15,8 @@ namespace fs = std::filesystem;
 constexpr int kWidth = 60, kHeight = 40;
 constexpr double kFocal = 50, kRadial = -0.6;
 
-/// What colmap leaves of a photo a.png under a lens: its models, and a pinhole of another size.
+/// What COLMAP leaves for a photo a.png taken with a lens: its models, and a pinhole of another
+/// size.
 ColmapRun straightened_set(const fs::path& folder) {
     const ColmapRun run{.photos = folder / "photos", .workspace = folder / "out"};
     write_png(run.photos / "a.png", ImageU8(kWidth, kHeight, 3));

@@ -23,8 +23,8 @@ TEST(TrackAdjustment, cameras_and_points_come_back) {
         EXPECT_GT(result.before_px, 0.5 * px);
         EXPECT_LT(result.after_px, 0.01);
         EXPECT_NEAR(result.median_move_px, px, 0.8 * px);
-        // Up to what moves the scene as a whole: seen from one camera, where the others' tracks
-        // say.
+        // Up to moves of the scene as a whole: as seen from one camera, the others are where the
+        // tracks say.
         for (const TrackObservation& o : track_observations(dataset)) {
             const double* x = &dataset.points.position[3 * size_t{o.point}];
             const glm::dvec2 at = pinhole_pixel(dataset.views[o.view].camera, {x[0], x[1], x[2]});
@@ -33,7 +33,7 @@ TEST(TrackAdjustment, cameras_and_points_come_back) {
     }
 }
 
-// Tracks of a reconstruction have errors; cameras at their optimum are no better after it.
+// Tracks of a reconstruction have errors; cameras at their optimum do not improve.
 TEST(TrackAdjustment, cameras_that_fit_stay_to_the_bit) {
     Dataset dataset = tracked_dataset();
     Pcg32 rng(4);

@@ -155,7 +155,7 @@ TEST(Transforms, val_filenames_are_the_test_set_where_there_is_no_other) {
     EXPECT_EQ(names(R"("test_filenames": ["c"], )" + val), std::vector<std::string>{"c"});
 }
 
-/// The notes of a file, in one.
+/// All notes of a file in one text.
 std::string notes_of(const std::string& head, const std::string& frames) {
     std::string all;
     for (const std::string& note : parse_transforms(file(head, frames), "t.json").notes)
@@ -434,7 +434,7 @@ TEST(TransformsSource, it_stands_in_for_a_colmap_model_whose_photos_are_missing)
     EXPECT_EQ(load_dataset(folder, cameras_only).views.at(0).camera.fx, 20);
 }
 
-// What makes the transforms file say more than the COLMAP model beside it.
+// What makes a transforms file say more than the COLMAP model beside it.
 TEST(TransformsSource, it_outranks_a_colmap_model_that_lacks_its_masks_split_or_choice) {
     const auto folder = test_folder();
     std::vector<View> views(3);

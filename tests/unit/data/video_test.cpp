@@ -49,7 +49,7 @@ TEST(Video, the_option_that_keeps_every_picture_follows_the_help) {
     EXPECT_EQ(every_picture_option(""), "-fps_mode passthrough") << "of versions to come";
 }
 
-// With the ffmpeg that is installed, and with one that knows one of the options alone.
+// Checks the installed ffmpeg, and one that knows only one of the two options.
 TEST(Video, pictures_arrive_in_a_folder_of_any_name_by_old_and_new_options) {
     if (!is_installed("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
     const std::string before = std::getenv("PATH"), real = "PATH='" + before + "' ffmpeg \"$@\"";

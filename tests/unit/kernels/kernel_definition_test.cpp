@@ -1,4 +1,4 @@
-// Kernels given by functions: the family written anew, what is refused, and the registry.
+// Kernels given by functions: the family written anew, profiles that are refused, and the registry.
 #include "engine/kernels/kernel_definition.h"
 
 #include <gtest/gtest.h>
@@ -114,7 +114,7 @@ TEST(KernelDefinition, Order_of_the_edge_is_found) {
     }
 }
 
-// u^2 to 1e-15 in double, and what follows from it in closed form.
+// u^2, accurate to 1e-15 in double, and everything that follows from it in closed form.
 TEST(KernelDefinition, A_kernel_of_ones_own_has_all_that_the_family_has) {
     const int k = register_kernel("biweight", 4, [](double q) { return std::pow(1 - q / 4, 2); });
     EXPECT_EQ(kernel_name(k), "biweight");
@@ -131,7 +131,8 @@ TEST(KernelDefinition, A_kernel_of_ones_own_has_all_that_the_family_has) {
     EXPECT_GT(kernel_radius_quantile(k, 0.9), kernel_radius_quantile(k, 0.5));
 }
 
-// No shader has exp(-q/2) cut at 9 to float accuracy: what is drawn is the polynomial, and truth.
+// No shader can draw exp(-q/2) cut at 9 to float accuracy: the polynomial is drawn, and is the
+// truth.
 TEST(KernelDefinition, A_profile_beyond_the_polynomials_becomes_the_nearest_one) {
     const auto w = [](double q) { return std::exp(-q / 2); };
     const KernelDefinition d = define_kernel("cut", 9, w, "");

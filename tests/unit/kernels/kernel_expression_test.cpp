@@ -1,4 +1,4 @@
-// Kernels as expressions, as lists of them on a command line, and the places of errors.
+// Kernels as expressions, lists of kernels on a command line, and the places of errors.
 #include "engine/kernels/kernel_expression.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ TEST(KernelList, Commas_of_brackets_and_of_a_kernel_do_not_split) {
     EXPECT_EQ(split_kernel_list(""), List{});
 }
 
-// The nine, as a user would write them.
+// The nine kernels, as a user would write them.
 TEST_F(KernelExpression, The_family_as_expressions_has_its_coefficients) {
     const char* family[KERNEL_COUNT] = {
         "expr: exp(-q/2)",
@@ -136,7 +136,7 @@ TEST_F(KernelExpression, A_name_that_another_kernel_has_is_refused_with_its_plac
     }
 }
 
-// No text is a crash; muParser's own limits included.
+// No text crashes, not even at muParser's own limits.
 TEST_F(KernelExpression, A_text_of_any_length_is_a_kernel_or_an_error) {
     const std::string whole = "expr: (0.5 + 0.5*cos(pi*d/3))^2, support 3^2, name any_length";
     int good = 0;

@@ -1,4 +1,4 @@
-// Kernels in JSON files and tables: what they give, and that no file is a crash.
+// Kernels in JSON files and tables: what they give, and that no file causes a crash.
 #include "engine/kernels/kernel_file.h"
 
 #include <fmt/format.h>

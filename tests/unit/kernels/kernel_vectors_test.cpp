@@ -23,16 +23,16 @@ class KernelVectors : public testing::Test {
         vectors_ = std::move(*loaded);
     }
 
-    /// `of` is a function of q, which the file rounds to double: a last bit more or less of q is
-    /// what limits it where it is steep or near a zero at the edge.
+    /// `of` is a function of q, which the file rounds to double. The last bit of q limits the
+    /// accuracy where `of` is steep, or near a zero at the edge.
     template <typename OfQ>
     static void expect_close(const KernelVector& v, const char* what, double expected,
                              const OfQ& of, double relative) {
         const double q1 = std::nextafter(v.q, 0), q2 = std::nextafter(q1, 0);
         const double below = of(q1), above = of(std::nextafter(v.q, 1e300));
-        // Where q lies on the edge itself, the other side of it is zero. A kernel's own jump there
-        // is no rounding: the steepness inside counts, three times, as a root's last step is 2.4
-        // times the one before.
+        // Where q lies on the edge itself, the function is zero on the other side. A kernel's own
+        // jump there is not rounding, so the steepness inside counts, three times, because the last
+        // step of a root is 2.4 times the one before.
         const bool beside_edge = below == 0 || above == 0;
         const double rounding_of_q =
             beside_edge ? 3 * std::abs(below - of(q2)) : std::abs(above - below);
@@ -55,7 +55,7 @@ TEST_F(KernelVectors, EveryKernel_hasTheSameKindsOfCases) {
 
 TEST_F(KernelVectors, Value_agreesTo1e13) {
     for (const KernelVector& v : vectors_) {
-        // Near the edge the last bit of q is what limits w: |dw| = |slope| q 2^-53.
+        // Near the edge, the last bit of q limits w: |dw| = |slope| q 2^-53.
         const double w = kernel_value(v.kernel, Footprint::psi, v.q);
         EXPECT_NEAR(v.w, w, 1e-13 * v.w + 2e-16 * (1 + v.q * std::abs(v.slope)))
             << kernel_name(v.kernel) << " case " << v.index << " (" << v.tag << ")";

@@ -1,4 +1,4 @@
-// A kernel that the product does not have, added by one row: all else must follow.
+// A kernel that the product does not have, added by one row: everything else must follow.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Blends of two kernels by a weight of each splat: the two at its ends, derivatives, integrals.
+// Blends of two kernels with a weight per splat: both ends, derivatives and integrals.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -95,7 +95,7 @@ TEST(ShapedBlend, Derivatives_matchDifferences) {
         }
 }
 
-// The line integral of the blend in space is what the exact footprint draws.
+// The exact footprint draws the line integral of the blend in space.
 TEST(ShapedBlend, ExactFootprint_isTheLineIntegral) {
     for (const int id : kBlends)
         for (const double shape : {-1.0, 0.4}) {

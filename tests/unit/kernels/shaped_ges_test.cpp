@@ -1,5 +1,5 @@
-// The kernel ges_published: the factor of its program, what it does to lengths, and the Gaussian
-// that everything else is.
+// The kernel ges_published: its program's factor, what that does to lengths, and the Gaussian that
+// everything else equals.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 
 const ShapedKernel& kGes = ges_kernel();
 
-/// As its program has it: 2 sigmoid(0.1 a), a from 0.
+/// As in its program: 2 sigmoid(0.1 a), with a starting at 0.
 double program_factor(double a) {
     return 2 / (1 + std::exp(-0.1 * a));
 }

@@ -1,5 +1,5 @@
-// The kernel whose shape each splat has: closed forms against differences, integrals and the row of
-// the family at the shape of the start.
+// The kernel with a shape per splat: closed forms against differences and integrals, and at the
+// start shape against the row of the family.
 #include "engine/kernels/shaped_kernel.h"
 
 #include <gtest/gtest.h>
@@ -113,7 +113,7 @@ TEST(ShapedKernel, FootprintsAndMoments_areTheIntegrals) {
         const double plane = integral(kR2, [&](double q) { return q * w(q); }) /
                              integral(kR2, [&](double q) { return w(q); }) / 2;
         EXPECT_NEAR(kBeta.second_moment(Footprint::psi, b), psi * plane, 1e-6);
-        // The exact footprint keeps the moment of space.
+        // The exact footprint preserves the moment in space.
         EXPECT_NEAR(kBeta.second_moment(Footprint::exact, b + 0.5), psi, 1e-6);
     }
 }

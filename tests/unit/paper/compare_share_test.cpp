@@ -1,4 +1,4 @@
-// Runs of a comparison on their way between ranks.
+// Runs of a comparison, sent between ranks.
 #include "tools/paper/compare_share.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The first of ranks whose others have sent these.
+// The first rank, to which the others have sent these.
 class SentByOthers : public OneRank {
   public:
     explicit SentByOthers(std::vector<Bytes> others) : others_(std::move(others)) {}

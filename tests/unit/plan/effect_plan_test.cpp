@@ -203,7 +203,8 @@ struct Capture {
         dataset.points.seen_by.clear();
     }
     EffectPlan plan() const { return plan_training(dataset, photos, 0); }
-    /// Beside near-plane care, which training always has, and anti-aliasing, which points call for.
+    /// Besides near-plane care, which training always has, and anti-aliasing, which points call
+    /// for.
     On on() const {
         On on = effects_on(plan());
         std::erase(on, EFFECT_NEAR);

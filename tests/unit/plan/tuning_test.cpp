@@ -162,7 +162,7 @@ TEST(FormTimes, another_form_is_best_only_for_a_gain_beyond_the_spread) {
     EXPECT_TRUE(may_be_chosen("subgroup"));
 }
 
-/// A GPU of which time and clock are made up: no test waits.
+/// A GPU with made-up times and clock, so that no test waits.
 class FakeGpu {
   public:
     explicit FakeGpu(std::vector<double> ms_at_boost) : ms_(std::move(ms_at_boost)) {}
@@ -202,7 +202,7 @@ class FakeGpu {
     Pcg32 random_{3, 3};
 };
 
-// What was done before: three frames to warm up, the least of seven, one form after the other.
+// The earlier method: three frames to warm up, the least of seven, one form after the other.
 std::size_t best_one_after_the_other(FakeGpu& gpu, std::size_t count) {
     gpu.idle(2);
     std::vector<double> least(count, 1e9);
@@ -385,7 +385,7 @@ TEST_F(Tuner, a_known_device_is_not_measured_unless_asked) {
     EXPECT_TRUE(fs::is_empty(folder_));
 }
 
-// What is forced wins over what the environment asks for, that over the record, that over the
+// What is forced takes precedence over the environment, that over the record, and that over the
 // default.
 TEST_F(Tuner, the_nearest_word_wins) {
     DeviceOptions options = test::device_options();
@@ -403,7 +403,7 @@ TEST_F(Tuner, the_nearest_word_wins) {
     EXPECT_THROW(tune(device, {"", "no_such=1", false, {}}), Error);
 }
 
-// Which way is the fastest is no matter here, only that all were measured and one of each is kept.
+// It does not matter which way is the fastest, only that all were measured and one of each is kept.
 TEST_F(Tuner, retuning_measures_every_way_and_keeps_the_choice_slow) {
     DeviceOptions options = test::device_options();
     options.cache_folder = folder_;

@@ -1,5 +1,5 @@
-// Gradients of the projection's effects, lens, 3D smoothing filter and anti-aliasing, against
-// central differences of a random linear function of what the projection gives.
+// Gradients of the projection's effects (lens, 3D smoothing filter and anti-aliasing) against
+// central differences of a random linear function of the projection's results.
 #include <gtest/gtest.h>
 
 #include "engine/core/rng.h"
@@ -153,7 +153,7 @@ TEST(ReferenceEffects, smoothing_filter_gradients_match_differences) {
 }
 
 TEST(ReferenceEffects, smoothing_filter_keeps_the_light_of_a_splat) {
-    // Opacity times volume is what the filter keeps: o s^3 = o' s'^3 for a round splat.
+    // The filter preserves opacity times volume: o s^3 = o' s'^3 for a round splat.
     auto splats = test::splats_of({{.log_scale = glm::dvec3(-2), .logit = 1}});
     splats.smoothing = {0.2};
     const auto p = project(splats, 0, test::small_camera(), {.low_pass = 0},

@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kDims = 9;
 
-/// Most rows near 0, some far off, as harmonics are.
+/// Most rows are near 0 and some far off, like harmonics.
 std::vector<float> sample_rows(size_t count, std::uint64_t seed = 1) {
     Pcg32 rng(seed);
     std::vector<float> rows;
@@ -35,7 +35,7 @@ double error_of_clusters(const std::vector<float>& rows, const Clusters& cluster
     return sum;
 }
 
-/// Lloyd over all rows at once, from rows that lie evenly: what leaves are measured against.
+/// Lloyd over all rows at once, from evenly spaced rows: what leaves are compared with.
 Clusters plain_k_means(const std::vector<float>& rows, size_t k) {
     const size_t count = rows.size() / kDims;
     Clusters clusters;
@@ -95,7 +95,7 @@ TEST(ClusterRows, equal_rows_and_few_are_no_trouble) {
     EXPECT_EQ(cluster_rows(sample_rows(1), kDims, 4).label.size(), 1u);
 }
 
-// Two leaves, of numbers without any order: the worst that leaves can meet.
+// Two leaves of numbers without any order: the worst case for leaves.
 TEST(ClusterRows, leaves_lose_little_against_plain_k_means) {
     const std::vector<float> rows = sample_rows(9000);
     const Clusters clusters = cluster_rows(rows, kDims, 450);
@@ -107,8 +107,8 @@ TEST(ClusterRows, leaves_lose_little_against_plain_k_means) {
     EXPECT_LT(ours, 1.25 * plain);
 }
 
-// As a small scene has it: more centres than half of the rows. The work has to stay below that of
-// a scene of many rows.
+// As in a small scene: more centres than half of the rows. The work must stay below that for a
+// scene with many rows.
 TEST(ClusterRows, many_centres_of_few_rows_are_near_and_cheap) {
     const std::vector<float> rows = sample_rows(9000);
     double work = 0;

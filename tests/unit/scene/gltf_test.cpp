@@ -1,5 +1,5 @@
-// glTF with KHR_gaussian_splatting: what is written is read back, files of other writers' kinds are
-// read by what they say, and hostile ones are refused.
+// glTF with KHR_gaussian_splatting: what is written can be read back, files in the style of other
+// writers are read as they state, and hostile ones are refused.
 #include <fmt/format.h>
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// .ksplat: files put together by hand at each compression level.
+// .ksplat: files built by hand at each compression level.
 #include <fmt/format.h>
 
 #include <array>
@@ -81,7 +81,7 @@ TEST(Ksplat, it_is_not_written) {
     EXPECT_FALSE(format_to_write("a.ksplat"));
     EXPECT_NE(error_of([] {
                   encode_splats(SplatFormat::ksplat, sample_model(0, 1));
-              }).find("read and not written"),
+              }).find("can be read, but not written"),
               std::string::npos);
 }
 

@@ -11,7 +11,8 @@
 namespace darb::test {
 namespace {
 
-/// The whole scene as one splat: mass, mean and covariance, merged in one sum, not in pairs.
+/// The whole scene as one splat: mass, mean and covariance, computed in one sum rather than by
+/// pairs.
 struct Whole {
     double mass = 0;
     glm::dvec3 mean{0.0}, dc{0.0};
@@ -34,7 +35,7 @@ double norm(const glm::dmat3& m) {
     return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
 }
 
-/// Opacity times the root mean square of the projected area: the formula by semi-axes.
+/// Opacity times the root mean square of the projected area, by a formula in the semi-axes.
 double mass_of(const SplatModel& model, std::size_t i) {
     double v[3];
     for (std::size_t k = 0; k < 3; ++k) v[k] = std::exp(2.0 * model.log_scale[3 * i + k]);
@@ -65,7 +66,7 @@ Whole whole_of(const SplatModel& model) {
     return whole;
 }
 
-/// Translucent, so that no merge is more than opaque.
+/// Translucent splats, so that no merge exceeds an opacity of 1.
 SplatModel translucent(std::size_t count, int degree = 1, std::uint64_t seed = 1) {
     SplatModel model = sample_model(degree, count, seed);
     for (float& logit : model.opacity_logit) logit = std::min(logit, 0.f) - 6;

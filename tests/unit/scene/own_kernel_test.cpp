@@ -1,4 +1,4 @@
-// Scenes of a kernel of one's own: the file keeps the kernel, and hostile headers are errors.
+// Scenes with a user's own kernel: the file keeps the kernel, and hostile headers are errors.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -78,7 +78,7 @@ TEST(OwnKernelFile, The_header_makes_the_same_kernel) {
               std::string::npos);
 }
 
-// As a program that has never heard of the kernel would: only the header speaks.
+// Reads the file like a program that has never heard of the kernel: only the header tells.
 TEST(OwnKernelFile, A_kernel_that_this_program_has_not_seen_is_made_from_the_header) {
     const std::string comments =
         "comment SplatKernel: of_elsewhere\n"
@@ -101,7 +101,7 @@ TEST(OwnKernelFile, Another_kernel_of_a_known_name_is_renamed_with_a_note) {
     EXPECT_NE(notes[0].find("bump_of_files_2"), std::string::npos) << notes[0];
 }
 
-// A file may be older than a kernel of the family.
+// A file may be older than a kernel of the family with the same name.
 TEST(OwnKernelFile, Names_of_the_family_get_a_number) {
     for (const std::string name : {"beta", "sinc"}) {
         std::vector<std::string> notes;
@@ -219,7 +219,7 @@ TEST(OwnKernelFile, Other_formats_say_that_they_have_no_place_for_it) {
     EXPECT_TRUE(losses_of(SplatFormat::compressed_ply, scene_of(bump()), "x").empty());
 }
 
-// The best Gaussian of the profile: a little wider or narrower, or fainter, is no nearer.
+// The best Gaussian for the profile: a slightly wider, narrower or fainter one is no closer.
 TEST(OwnKernelFile, It_becomes_its_nearest_Gaussians) {
     GaussianEquivalent fit{};
     const SplatModel gaussians = as_gaussians(scene_of(bump()), true, &fit);

@@ -1,4 +1,4 @@
-// Splat PLYs as other programs write them: what is read, and what is said of it.
+// Splat PLYs as other programs write them: what is read, and which notes are given.
 #include "engine/scene/ply.h"
 
 #include <fmt/format.h>

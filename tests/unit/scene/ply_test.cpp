@@ -193,7 +193,7 @@ TEST(Ply, splats_with_nan_or_infinity_are_dropped_and_counted) {
     EXPECT_EQ(facts.dropped, 1u);
 }
 
-// PLYs expanded from formats with a byte of opacity hold the logit of 255, +inf.
+// PLYs expanded from formats with one byte of opacity hold the logit of 255, +inf.
 TEST(Ply, infinite_opacity_and_no_extent_are_kept_at_the_limits) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     SplatModel model = random_model(0, 4);
@@ -361,8 +361,8 @@ TEST(Ply, map_coordinates_keep_millimetres) {
     expect_same(again, model);
 }
 
-// Training counts positions from near their median long before float32 fails; other programs read
-// float32 alone.
+// Training stores positions relative to their median long before float32 fails; other programs read
+// plain float32.
 TEST(Ply, doubles_are_written_only_where_float32_does_not_resolve_the_positions) {
     const auto header_at = [](double origin) {
         SplatModel model =

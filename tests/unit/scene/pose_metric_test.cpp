@@ -1,4 +1,4 @@
-// Steps of a pose in pixels, and what moves the scene as a whole.
+// Steps of a pose in pixels, and steps that move the scene as a whole.
 #include "engine/scene/pose_metric.h"
 
 #include <gtest/gtest.h>

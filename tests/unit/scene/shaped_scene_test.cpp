@@ -1,4 +1,4 @@
-// Scenes of the kernel beta: what files keep of each splat's shape and which refuse it, scenes of
+// Scenes with the kernel beta: which files keep each splat's shape and which refuse it, scenes of
 // Deformable Beta Splatting, and the nearest Gaussians.
 #include <gtest/gtest.h>
 
@@ -99,7 +99,8 @@ TEST(ShapedScene, formats_without_a_place_refuse_and_name_the_remedy) {
     }
 }
 
-// A splat of theirs, (1 - d^2)^b with b = 4 exp(beta), is drawn as such a profile here.
+// A splat of Deformable Beta Splatting, (1 - d^2)^b with b = 4 exp(beta), is drawn with that
+// profile.
 TEST(ShapedScene, scenes_of_deformable_beta_splatting_are_read) {
     const std::string header =
         "ply\nformat ascii 1.0\nelement vertex 3\n"

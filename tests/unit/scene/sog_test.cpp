@@ -153,7 +153,7 @@ TEST(Sog, a_zip_of_something_else_is_named_as_such) {
     Parts parts;
     append_text("text", parts["readme.txt"]);
     std::string error = error_of([&] { kReadSog(zip_of(parts)); });
-    EXPECT_NE(error.find("no SOG scene"), std::string::npos) << error;
+    EXPECT_NE(error.find("not a SOG scene"), std::string::npos) << error;
     append_text("ply", parts["scene/point_cloud.ply"]);
     error = error_of([&] { kReadSog(zip_of(parts)); });
     EXPECT_NE(error.find("holds scene/point_cloud.ply"), std::string::npos) << error;

@@ -1,4 +1,4 @@
-// SOG as it is written: what comes back, from a zip and from a folder.
+// Writing SOG: what is read back, from a zip and from a folder.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// In the order of the file.
+/// The splats in the order of the file.
 SplatModel ordered(const SplatModel& model) {
     return pick_splats(model, chunk_order(model, 256));
 }
@@ -48,7 +48,7 @@ void expect_near(const SplatModel& got, const SplatModel& model, double harmonic
     EXPECT_LE(square, harmonics * harmonics * whole);
 }
 
-// Up to 1,024 splats each has a row of the palette of its own.
+// Up to 1,024 splats, each has its own row in the palette.
 TEST(SogWrite, a_scene_comes_back_from_a_zip) {
     for (int degree = 0; degree <= 3; ++degree) {
         SplatModel model = sample_model(degree, 700);

@@ -1,6 +1,6 @@
-// The table of splat attributes: its rows fit together, files carry every row, and what only
-// carries attributes names none of them, so that the next one is a row, its shader code and its
-// truth.
+// The table of splat attributes: its rows fit together, files carry every row, and code that only
+// passes attributes on names none of them, so that adding one takes a row, its shader code and its
+// reference.
 #include "engine/scene/splat_model.h"
 
 #include <fmt/format.h>
@@ -21,7 +21,7 @@
 namespace darb {
 namespace {
 
-/// Every float another number, of 3 splats.
+/// 3 splats in which every float is a different number.
 SplatModel counted(int sh_degree) {
     SplatModel model;
     model.sh_degree = sh_degree;

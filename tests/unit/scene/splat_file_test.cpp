@@ -130,7 +130,8 @@ TEST(SplatFile, names_choose_what_is_written) {
 constexpr SplatFormat kFormats[] = {DARB_SPLAT_FORMATS(DARB_SPLAT_FORMAT)};
 #undef DARB_SPLAT_FORMAT
 
-// A row that is not written asks for nothing; what asks for a row writes what the row reads.
+// A format that cannot be written is asked for by no name; a name that asks for a format writes
+// what its reader reads.
 TEST(SplatFile, a_row_of_the_table_answers_everywhere) {
     const std::string all = endings_to_write();
     const fs::path folder = fs::path(testing::TempDir()) / fmt::format("table_{}", ::getpid());
@@ -144,8 +145,9 @@ TEST(SplatFile, a_row_of_the_table_answers_everywhere) {
             parse_splats(text, "none");
         });
         EXPECT_NE(refused.find(format_name(format)), std::string::npos) << refused;
-        if (error_of([&] { encode_scene(format, model, "none"); }).find("read and not written") !=
-            std::string::npos)
+        if (error_of([&] {
+                encode_scene(format, model, "none");
+            }).find("can be read, but not written") != std::string::npos)
             continue;
         for (const std::string& ending : endings_of(format)) {
             const std::string name = ending.starts_with('.') ? "scene" + ending : ending;
@@ -303,7 +305,7 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-// The decoded file was expanded by another program.
+// The expanded file was made by another program.
 TEST(SplatFile, compressed_ply_agrees_with_an_independent_expansion) {
     const auto folder = test_data_folder();
     if (!folder) GTEST_SKIP() << kNoTestData;
@@ -327,7 +329,7 @@ TEST(SplatFile, compressed_ply_agrees_with_an_independent_expansion) {
         near(a.log_scale, b.log_scale, 2e-6);
         near(a.opacity_logit, b.opacity_logit, 1e-5);
         near(a.sh_dc, b.sh_dc, 1e-5);
-        // It takes byte / 255 where the writers of the format take the middle of a 256th.
+        // It takes byte / 255, where the writers of the format take the middle of a 256th.
         near(a.sh_rest, b.sh_rest, 8 * 0.5 / 256 + 1e-6);
         for (size_t i = 0; i < a.size(); ++i)
             ASSERT_GT(same_rotation(a, i, b, i), 1 - 1e-6) << name << " " << i;

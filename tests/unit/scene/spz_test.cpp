@@ -296,7 +296,7 @@ TEST(Spz, wrong_headers_say_why) {
         file[at] = std::byte(value);
         return error_of([&] { kReadSpz(gzip(file)); });
     };
-    EXPECT_NE(error(0, 'X').find("no SPZ"), std::string::npos);
+    EXPECT_NE(error(0, 'X').find("not SPZ"), std::string::npos);
     EXPECT_NE(error(4, 9).find("version 9"), std::string::npos);
     EXPECT_NE(error(12, 5).find("SH degree 5"), std::string::npos);
     EXPECT_NE(error(13, 25).find("fractional"), std::string::npos);

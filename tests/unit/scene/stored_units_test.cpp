@@ -1,5 +1,6 @@
-// Files whose values are stored otherwise than in a scene of 3DGS: they are doubted, by all of
-// their values, and read aright where the user says how they are stored. Scenes are not doubted.
+// Files whose values are stored in other units than those of a 3DGS scene: they are doubted, judged
+// by all their values, and read correctly where the user says how they are stored. Ordinary scenes
+// are not doubted.
 #include "engine/scene/stored_units.h"
 
 #include <fmt/format.h>
@@ -19,7 +20,7 @@ namespace {
 
 constexpr std::size_t kSplats = 2000;
 
-// Splats flat in the surface of half a ball, a little overlapping, as trained ones are.
+// Flat splats in the surface of half a ball that overlap slightly, like trained ones.
 SplatModel ball(int degree = 0, double radius = 1) {
     SplatModel model;
     model.sh_degree = degree;

@@ -24,7 +24,7 @@ class StreamedSog : public testing::Test {
     void TearDown() override { fs::remove_all(folder_); }
 
     json meta() const { return json::parse(read_text_file(folder_ / "lod-meta.json")); }
-    /// What reading says after a change of lod-meta.json.
+    /// The result of reading after a change to lod-meta.json.
     std::string error_after(const std::string& pointer, const json& value) const {
         json changed = meta();
         changed[json::json_pointer(pointer)] = value;
@@ -40,7 +40,7 @@ class StreamedSog : public testing::Test {
     fs::path folder_ = fs::path(testing::TempDir()) / fmt::format("streamed_{}", ::getpid());
 };
 
-/// Leaves under a node; every range lies in its file, every bound in its parent's.
+/// Checks the leaves under a node: every range lies in its file, and every bound in its parent's.
 void check_node(const json& node, std::vector<size_t>& counts) {
     for (int axis = 0; axis < 3; ++axis)
         EXPECT_LE(node["bound"]["min"][axis], node["bound"]["max"][axis]);

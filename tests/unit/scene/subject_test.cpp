@@ -1,4 +1,4 @@
-// What a scene is looked at for, of synthetic rigs of cameras.
+// The subject of a scene, with synthetic rigs of cameras.
 #include "engine/scene/subject.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ void add_shell(const glm::dvec3& centre, double radius, int count, SplatModel& m
     }
 }
 
-/// A wall or a floor: from a corner along two sides.
+/// A wall or a floor, given by a corner and two sides.
 void add_plane(const glm::dvec3& from, const glm::dvec3& a, const glm::dvec3& b, int count,
                SplatModel& m) {
     Pcg32 rng(7);

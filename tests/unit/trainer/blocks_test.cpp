@@ -175,7 +175,7 @@ TEST(BlockScene, trains_cell_and_margin_and_freezes_what_cameras_see_around) {
     EXPECT_EQ(block_start(coarse, region, {}, away, 0).frozen, 0u);
 }
 
-// 20 splats of a cell that is done stand in the margin of the next, in place of the coarse ones.
+// 20 splats of a finished cell stand in the margin of the next one, in place of the coarse ones.
 TEST(BlockScene, what_is_done_beside_a_block_is_frozen_and_not_trained_again) {
     const SplatModel coarse = flat_model();
     const Partition cells = two_cells();
@@ -341,7 +341,7 @@ TEST_F(BlocksManifestFile, damaged_is_an_error_that_names_it) {
     EXPECT_THROW(read_manifest(path_), Error);
 }
 
-// Every rank, each with what a call of gather gives to all.
+// Runs every rank, each with what a call of gather returns to all.
 class Turns : public OneRank {
   public:
     Turns(int rank, int count) : rank_(rank), count_(count) {}

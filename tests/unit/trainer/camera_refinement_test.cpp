@@ -1,4 +1,4 @@
-// Refined cameras without a picture: what the anchor of the tracks alone makes of them.
+// Refined cameras without a picture: the effect of the anchor of tracks alone.
 #include "trainer/step/camera_refinement.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ void visit_all(CameraRefinement& cameras, const Dataset& dataset, int begin, int
     }
 }
 
-// Points are where they are: poses come back, and a wrong focal length does.
+// With the points where they are, poses come back, and so does a wrong focal length.
 TEST(CameraRefinement, tracks_bring_disturbed_cameras_back) {
     const Dataset truth = tracked_dataset();
     const auto places = places_of(truth);

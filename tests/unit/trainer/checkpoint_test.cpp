@@ -1,5 +1,5 @@
-// Checkpoint files: what is written comes back, and whatever is damaged, cut or of another run is
-// an Error that names the file and the reason.
+// Checkpoint files: what is written can be read back, and a file that is damaged, cut off or from
+// another run gives an Error that names the file and the reason.
 #include <gtest/gtest.h>
 #include <malloc.h>
 #include <sys/resource.h>

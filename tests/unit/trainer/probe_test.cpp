@@ -1,4 +1,5 @@
-// trainer/probe: what a probe of the degree does with the run that it forks, on a run that is none.
+// trainer/probe: what a probe of the degree does with the run that it forks, on a stand-in for a
+// run.
 #include "trainer/step/probe.h"
 
 #include <gtest/gtest.h>

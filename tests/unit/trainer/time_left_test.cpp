@@ -1,4 +1,4 @@
-// What is left of a run, on runs whose pace was recorded (tools/lab/record_pace.py).
+// The time left of a run, estimated for runs whose pace was recorded (tools/lab/record_pace.py).
 #include "trainer/run/time_left.h"
 
 #include <gtest/gtest.h>
@@ -47,9 +47,9 @@ std::vector<Recorded> recorded_runs() {
     return runs;
 }
 
-// Whether a run's estimates are right within two times from 5 % of it on, and within 1.6 times
-// from 24 % on. The iterations of a
-// sample take what its passes do; what else it took, as a probe, comes with the first of them.
+// Whether a run's estimates are right within a factor of two from 5 % of it on, and within 1.6 from
+// 24 % on. The iterations of a sample take the time of its passes; other work, such as a probe, is
+// added to the first of them.
 void check(const Recorded& run) {
     TimeLeft left(run.options, run.pace);
     left.add(0, 0, run.pace.start_splats);
@@ -88,9 +88,9 @@ TEST(TimeLeft, follows_a_device_that_is_half_as_fast_as_forecast) {
     }
 }
 
-// A run of which all is known: how it grows, what its photos of a half and of a quarter of the
-// sides take, and how much slower the machine is while other programs use it. Iterations take up to
-// 30 % more or less, and now and then one takes as long as twenty.
+// A run about which everything is known: how it grows, what photos with a half and a quarter of the
+// sides take, and how much slower the machine is while other programs use it. Iterations vary by up
+// to 30 %, and now and then one takes as long as twenty.
 struct MadeUp {
     std::string name;
     PaceForecast pace;

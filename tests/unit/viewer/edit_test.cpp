@@ -10,7 +10,7 @@
 namespace darb {
 namespace {
 
-// Splats at x = 0, 1, ..., n - 1; every value tells its splat.
+// Splats at x = 0, 1, ..., n - 1; every value identifies its splat.
 SplatModel row(size_t n, int degree = 1) {
     SplatModel m;
     m.sh_degree = degree;

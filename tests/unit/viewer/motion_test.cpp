@@ -10,7 +10,7 @@
 namespace darb {
 namespace {
 
-// A device on which a whole picture takes so long for its splats and its pixels.
+// A device on which a whole picture takes this long for its splats and its pixels.
 struct Modelled {
     double fixed_ms, splats_ms, pixels_ms;
     MotionCost cost(const MotionQuality& q) const {
@@ -56,7 +56,8 @@ TEST(MotionControl, A_quick_device_gets_the_whole_picture_within_a_second) {
     }
 }
 
-// Between the share that is held in order and all splats there is nothing: no change to and fro.
+// There is nothing between the share that is kept in order and all splats, so that pictures do not
+// alternate.
 TEST(MotionControl, It_comes_to_rest) {
     for (const double most : {0.5, 0.4})
         for (const Modelled& device :

@@ -85,7 +85,7 @@ View view_from(std::string name, double azimuth, double elevation, double radius
 
 constexpr int kTurns = 3;
 
-// The path, kTurns turns at changing heights, by the share of it that is behind: 0 to 1.
+// The path, kTurns turns at changing heights, by the share of it that lies behind, 0 to 1.
 double path_azimuth(double share) {
     return kTau * kTurns * share + 0.4;
 }

@@ -1,7 +1,7 @@
 // make_scene FOLDER [SCALE]: renders the data set that the project ships: a still life seen from 40
-// training and 8 held-out cameras, with a COLMAP model, and 16 views off that path. The same bytes
-// on every run. SCALE 1 to 8 multiplies the photos' sides of 200 x 150 px.
-// make_scene depths FOLDER [SCALE]: the same with the true depths of all views beside the photos.
+// training and 8 held-out cameras, with a COLMAP model, and 16 views off that path. Every run
+// writes the same bytes. SCALE 1 to 8 multiplies the photos' sides of 200 x 150 px.
+// make_scene depths FOLDER [SCALE]: also writes the true depths of all views beside the photos.
 // make_scene outdoors FOLDER [SCALE]: photos from near the ground, under clouds.
 // make_scene town FOLDER SIDE SCALE: SIDE x SIDE photos of a town of 16 blocks (town.h).
 #include <cstdio>

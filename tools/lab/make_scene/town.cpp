@@ -104,7 +104,7 @@ std::vector<View> town_flight(int side, double scale) {
             const dvec3 eye(half * (2.0 * x / (side - 1) - 1), half * (2.0 * y / (side - 1) - 1),
                             kFlight + kClimb * (v % 2));
             const double reach = eye.z / std::tan(glm::radians(kTilt));
-            // So that the picture's middle is below the camera, on the whole.
+            // Keeps the picture's middle below the camera on average.
             const dvec3 forth(std::cos(heading), std::sin(heading), 0);
             View view;
             view.name = fmt::format("photo_{:03d}.png", v);

@@ -78,7 +78,8 @@ double distance_to_cone(const dvec3& size, const dvec3& p) {
     return sign * std::sqrt(std::min(glm::dot(ca, ca), glm::dot(cb, cb)));
 }
 
-// Sphere tracing inside the bounding sphere, for shapes whose distance is easier than their roots.
+// Sphere tracing inside the bounding sphere, for shapes whose distance is easier to compute than
+// their roots.
 template <class Distance>
 std::optional<ShapeHit> march(Distance&& distance, double bound, const Ray& ray, double t_min,
                               double t_max) {
@@ -187,7 +188,7 @@ dvec3 dots(const dvec3& p, const dvec3& n, const dvec3& a, const dvec3& b, doubl
     return glm::length(cell) < 0.3 ? b : a;
 }
 
-// Stone tiles, each of its own shade, with grout between.
+// Stone tiles, each in its own shade, with grout between them.
 dvec3 tiles(const dvec3& p, const dvec3& a, const dvec3& b, double period) {
     const dvec2 q = dvec2(p) / period;
     const dvec2 edge = 0.5 - glm::abs(glm::fract(q) - 0.5);

@@ -41,14 +41,14 @@ std::string transforms_json(const std::vector<View>& views, bool test) {
     return file.dump(1) + "\n";
 }
 
-// A folder of photos that this program did not make stays as it is.
+// Leaves a folder alone that holds photos which this program did not make.
 void refuse_other_photos(const std::filesystem::path& images, const std::vector<View>& views) {
     std::error_code none;  // there is no such folder
     for (const auto& entry : std::filesystem::directory_iterator(images, none))
         if (std::none_of(views.begin(), views.end(), [&](const View& view) {
                 return view.name == entry.path().filename().string();
             }))
-            throw Error(entry.path().string(), "is none of the photos that are made here",
+            throw Error(entry.path().string(), "is not one of the photos that are made here",
                         "Name an empty folder.");
 }
 
