@@ -173,11 +173,21 @@ void move_camera(const Input& in, const ControlFrame& frame, Session& s) {
     s.navigation.fly(glm::normalize(direction) * s.fly_speed * std::min(frame.seconds, 0.25));
 }
 
-void Session::tell(const std::string& text) {
+void AskedState::tell(const std::string& text) {
     constexpr auto kShown = std::chrono::seconds(4);
     note = text;
     toasts.push_back({text, std::chrono::steady_clock::now() + kShown});
     ++told;
+}
+
+bool AskedState::attempt(const std::function<void()>& step) {
+    try {
+        step();
+        return true;
+    } catch (const std::exception& e) {
+        error = e.what();
+        return false;
+    }
 }
 
 void play_path(double seconds, Session& s) {

@@ -21,22 +21,6 @@ struct Cancelled {};
 constexpr std::size_t kReadBlock = 8 << 20;             // bytes between two reports
 constexpr double kReadShare = 0.4, kDecodeShare = 0.5;  // of the time, by experience
 
-// A pipe would be waited for until somebody writes to it, which nobody can cancel.
-void refuse_by_kind(const std::filesystem::path& file) {
-    std::error_code error;
-    const std::filesystem::file_type kind = std::filesystem::status(file, error).type();
-    using enum std::filesystem::file_type;
-    if (kind == regular || scene_file_in(file)) return;
-    const char* const what = kind == not_found   ? "is not there"
-                             : kind == directory ? "is a folder without a scene"
-                             : kind == fifo      ? "is a pipe"
-                             : kind == socket    ? "is a socket"
-                             : kind == character ? "is a device"
-                             : kind == block     ? "is a device"
-                                                 : "cannot be read";
-    throw Error(file.string(), what, "Name a splat file, for example a .ply.");
-}
-
 std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
                                       const LoadProgress& progress) {
     check_is_file(file);
@@ -59,6 +43,22 @@ std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
 
 }  // namespace
 
+// A pipe would be waited for until somebody writes to it, which nobody can cancel.
+void check_scene_file(const std::filesystem::path& file) {
+    std::error_code error;
+    const std::filesystem::file_type kind = std::filesystem::status(file, error).type();
+    using enum std::filesystem::file_type;
+    if (kind == regular || scene_file_in(file)) return;
+    const char* const what = kind == not_found   ? "is not there"
+                             : kind == directory ? "is a folder without a scene"
+                             : kind == fifo      ? "is a pipe"
+                             : kind == socket    ? "is a socket"
+                             : kind == character ? "is a device"
+                             : kind == block     ? "is a device"
+                                                 : "cannot be read";
+    throw Error(file.string(), what, "Name a splat file, for example a .ply.");
+}
+
 void measure_scene(Scene& scene) {
     scene.bounds = scene_bounds(scene.model);
     scene.subject = subject_of(scene.model);
@@ -71,7 +71,7 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = file;
-    refuse_by_kind(file);
+    check_scene_file(file);
     SplatFile facts;
     const std::filesystem::path inner = scene_file_in(file).value_or(file);
     const std::vector<std::byte> bytes = read_in_blocks(inner, progress);

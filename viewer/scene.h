@@ -33,6 +33,9 @@ struct Scene {
 /// Bounds, and what is important of the model; its subject as if it had no cameras.
 void measure_scene(Scene& scene);
 
+/// Throws Error where this is neither a file nor a folder of a scene: it is not there, or a pipe.
+void check_scene_file(const std::filesystem::path& file);
+
 /// A file that load_splats reads, or a PLY point cloud, which becomes small opaque splats.
 /// `progress` is called with 0..1 and what is being done; it throws to cancel. Throws Error naming
 /// the file.

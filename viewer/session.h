@@ -1,9 +1,11 @@
-// Session: everything that the panels show and edit. Panels change it and ask, the viewer acts.
+// Session: everything that the panels show and edit, in three parts. Panels change it and ask, the
+// viewer acts.
 #pragma once
 
 #include <chrono>
 #include <deque>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -99,44 +101,58 @@ struct Leaving {
     std::filesystem::path open;  // where it is not quit
 };
 
-struct Session {
+/// What is shown (viewer/document.h).
+struct ShownState {
     std::unique_ptr<Scene> scene;  // null: none yet, or a training run is shown
     Edit edit;
     Selection selection;
-    ToolState tools;
-    OpenDialog open_dialog;
     std::filesystem::path save_file;
     Navigation navigation;
     double fly_speed = 1;            // world units a second
-    DisplaySettings display, own;    // own: as the scene is meant to be shown
     std::optional<EffectPlan> plan;  // of the scene
     Photos photos;
-    Panes panes;
     PathState path;
     TrainingCurves training;
-    FrameTimes times;
-    RequestQueue requests;
-    std::vector<WindowRequest> for_window;  // of the last frame
-    std::optional<Leaving> leaving;         // waits for an answer
-    std::string title;                      // of what is shown, for a window
-    std::string error;                      // shown until dismissed
-    std::string note;                       // shown in the status line, by tell
-    std::deque<Toast> toasts;               // latest last
-    int told = 0;                           // how many there were
-    std::string device_name;
-    WorkProgress progress;
-    std::vector<MeasuredChoice> measured;
-    int sh_degree = 0;  // highest of the scene or the run
-    bool panels = true;
-    bool help = false;  // the list of keys
-    float gui_scale = 1;
+    std::string title;          // of what is shown, for a window
+    int sh_degree = 0;          // highest of the scene or the run
     bool up_is_guess = false;   // nothing says what is up, nor did the user
     bool save_upright = false;  // turns what is saved so that up becomes -y
+};
+
+/// How it is painted (viewer/painter.h).
+struct PaintedState {
+    DisplaySettings display, own;  // own: as the scene is meant to be shown
+    Panes panes;
+    FrameTimes times;
+    std::vector<MeasuredChoice> measured;
+    std::string device_name;
+    float gui_scale = 1;
+    bool panels = true;
+};
+
+/// What was asked, and what is answered (viewer/controller.h).
+struct AskedState {
+    RequestQueue requests;
+    std::vector<WindowRequest> for_window;  // of the last frame
+    ToolState tools;
+    OpenDialog open_dialog;
+    std::optional<Leaving> leaving;  // waits for an answer
+    WorkProgress progress;
+    std::string error;         // shown until dismissed
+    std::string note;          // shown in the status line, by tell
+    std::deque<Toast> toasts;  // latest last
+    int told = 0;              // how many there were
+    bool help = false;         // the list of keys
 
     void ask(const Request& request) { requests.push_back(request); }
     /// In the status line and over the picture.
     void tell(const std::string& text);
+    /// A step that fails leaves the others alone: its error is shown. Whether it did not.
+    bool attempt(const std::function<void()>& step);
 };
+
+/// All of it, for the panels.
+struct Session : ShownState, PaintedState, AskedState {};
 
 /// The panels of one frame; progress, errors and questions also where session.panels is off. Needs
 /// an ImGui frame, in whose coordinates they are.

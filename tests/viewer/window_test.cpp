@@ -102,6 +102,17 @@ TEST_F(WindowTest, A_screenshot_is_what_its_name_says) {
         << log("shot.log");
 }
 
+// A window opened, empty, and the command waited for it to be closed.
+TEST_F(WindowTest, A_scene_that_is_not_there_is_an_error_without_a_window) {
+    const fs::path missing = folder_ / "none.ply";
+    program_.emplace(command(missing, {}), folder_ / "missing.log");
+    ASSERT_TRUE(eventually([&] { return !program_->running(); }));
+    EXPECT_EQ(program_->wait(), 2);
+    EXPECT_NE(log("missing.log").find("none.ply: is not there\n  Name a splat file"),
+              std::string::npos)
+        << log("missing.log");
+}
+
 // Closing waited for whoever would write to the pipe.
 TEST_F(WindowTest, A_dropped_pipe_is_refused_and_the_window_closes_slow) {
     const fs::path pipe = folder_ / "pipe.ply";

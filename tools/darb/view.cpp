@@ -95,7 +95,7 @@ int view(ViewFlags flags) {
         together({files_of(flags.scene), files_of(flags.cameras), files_of(flags.path)}));
     refuse_other_pictures(flags.screenshot);
     if (!flags.scene.empty())
-        find_scene(flags.scene);  // says what is no scene before a window opens
+        check_scene_file(find_scene(flags.scene));  // says so before a window opens
     std::string note;
     options.views = find_views(flags, note);
     refuse_to_overwrite_inputs({flags.screenshot, flags.times}, files_of(options.views));

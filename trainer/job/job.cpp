@@ -1,4 +1,3 @@
-#include "trainer/job/job.h"
 #include "engine/plan/tuning_names.h"
 
 #include <fmt/format.h>

@@ -1,0 +1,213 @@
+#include "viewer/controller.h"
+
+#include <fmt/format.h>
+
+#include <limits>
+#include <utility>
+
+#include "engine/core/error.h"
+#include "engine/data/image_io.h"
+#include "viewer/tools.h"
+
+namespace darb {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Not one of a link either, to whatever it leads.
+fs::path free_picture_name() {
+    for (int n = 1;; ++n) {
+        const fs::path file = fmt::format("darb_{:03d}.png", n);
+        if (fs::symlink_status(file).type() == fs::file_type::not_found) return file;
+    }
+}
+
+template <class... Kinds>
+struct ByKind : Kinds... {
+    using Kinds::operator()...;
+};
+template <class... Kinds>
+ByKind(Kinds...) -> ByKind<Kinds...>;
+
+}  // namespace
+
+void Controller::take_loaded() {
+    session_->attempt([&] {
+        std::optional<LoadedScene> loaded = document_->take_loaded();
+        if (!loaded) return;
+        if (loaded->merges && session_->scene)
+            merge(std::move(*loaded));
+        else if (document_->edited_meanwhile())
+            session_->leaving = Leaving{false, loaded->asked_for};
+        else
+            show(std::move(*loaded));
+    });
+}
+
+void Controller::take_pictures_of_run() {
+    session_->attempt([&] {
+        while (const std::optional<LiveMade> made = document_->take_picture_of_run())
+            painter_->show_picture_of_run(*made);
+    });
+}
+
+// The device's copy first: when that fails, the scene before is still there.
+void Controller::show(LoadedScene loaded) {
+    auto scene = std::make_unique<Scene>(std::move(loaded.scene));
+    painter_->open(*scene);
+    painter_->begin_scene(document_->show(std::move(scene), loaded.asked_for, loaded.dropped));
+}
+
+void Controller::merge(LoadedScene loaded) {
+    Session& s = *session_;
+    const std::string from = loaded.scene.file.filename().string();
+    const Bounds added = loaded.scene.subject;
+    const std::size_t count = document_->merge(std::move(loaded.scene.model));
+    try {
+        show_edits();
+    } catch (const std::exception&) {  // the device has no room: as it was before
+        s.edit.take_back(s.scene->model);
+        show_edits();
+        throw;
+    }
+    if (count > 0) s.ask(request::Frame{added.centre, added.radius});
+    s.tell(
+        fmt::format("merged {} splats of {}: they are selected, and 6, 7 and 8 move, turn and "
+                    "scale them",
+                    count, from));
+}
+
+bool Controller::take_input(const Input& input, const ControlFrame& frame) {
+    Session& s = *session_;
+    for (const fs::path& path : input.dropped) s.attempt([&] { drop(path); });
+    if (!frame.panels_want_keys)
+        for (const Key key : input.pressed) press(key, s);
+    document_->follow_photo(frame.width, frame.height);
+    Input moves = input;
+    if (use_tool(input, frame, s)) moves.left = moves.double_click = false;
+    move_camera(moves, frame, s);
+    play_path(frame.seconds, s);
+    return holds_a_key(input);
+}
+
+void Controller::act(int width, int height) {
+    Session& s = *session_;
+    s.for_window.clear();
+    const ByKind act{
+        [&](request::FrameAll) { document_->frame_all(width, height); },
+        [&](const request::Frame& ball) {
+            document_->frame_on({ball.centre, ball.radius}, width, height);
+        },
+        [&](request::TakePicture) { take_picture(width, height); },
+        [&](request::ChooseCamera camera) { document_->choose_camera(camera.view); },
+        [&](request::LeavePhoto) { leave_photo(s); },
+        [&](request::FollowPlan) { document_->follow_plan(); },
+        [&](request::Measure) {
+            document_->need_scene("measurement");
+            painter_->start_measure(width, height);
+        },
+        [&](request::ShowOpen open) { show_open(open.merges); },
+        [&](const request::Open& open) { open_file(open.file, open.merges); },
+        [&](request::ShowEdits) { show_edits(); },
+        [&](request::Save) { document_->save_scene(*device_); },
+        [&](request::SavePage) { document_->save_page(*device_, width, height); },
+        [&](request::LoadPath) { document_->load_path(); },
+        [&](request::SavePath) { document_->save_path(); },
+        [&](request::ExportPath) {
+            document_->need_scene("export");
+            painter_->start_export();
+        },
+        [&](request::CancelLoad) { document_->cancel_load(); },
+        [&](request::CancelWork) { painter_->cancel_work(); },
+        [&](request::Quit) { quit(); },
+        [&](request::SaveAndLeave) { save_and_leave(); },
+        [&](request::Leave) { leave(); },
+        [&](request::Stay) { s.leaving.reset(); },
+        [&](request::ToggleFullScreen) {
+            s.for_window.push_back(WindowRequest::toggle_full_screen);
+        },
+        [&](request::LeaveFullScreen) { s.for_window.push_back(WindowRequest::leave_full_screen); },
+    };
+    for (const Request& request : std::exchange(s.requests, {}))
+        s.attempt([&] { std::visit(act, request); });
+    s.attempt([&] { document_->remember_up(); });
+    document_->wish(width, height);
+}
+
+double Controller::expire_toasts() {
+    Session& s = *session_;
+    if (std::exchange(told_, s.told) != s.told) painter_->unsettle();  // it is not drawn yet
+    const auto now = std::chrono::steady_clock::now();
+    while (!s.toasts.empty() && s.toasts.front().until <= now) s.toasts.pop_front();
+    if (s.toasts.empty()) return std::numeric_limits<double>::infinity();
+    return std::chrono::duration<double>(s.toasts.front().until - now).count() + 0.001;
+}
+
+// What a user drops: not on a run, and not over unsaved edits without a question.
+void Controller::drop(const fs::path& path) {
+    Session& s = *session_;
+    if (s.training.live && !s.training.finished)
+        s.tell("A run is shown: files can be opened when it is over.");
+    else if (s.scene && s.edit.unsaved())
+        s.leaving = Leaving{false, path};
+    else
+        document_->load(path, true);
+}
+
+void Controller::show_open(bool merges) {
+    OpenDialog& dialog = session_->open_dialog;
+    dialog.shown = !dialog.shown || dialog.merges != merges;
+    dialog.merges = merges;
+    dialog.recent = document_->recent();
+    if (!dialog.folder.empty()) dialog.entries = list_folder(dialog.folder);
+}
+
+void Controller::open_file(const fs::path& file, bool merges) {
+    if (!merges) return drop(file);
+    document_->need_scene("merging");
+    document_->load(file, true, true);
+}
+
+void Controller::show_edits() {
+    if (!session_->scene) return;
+    document_->follow_edits();
+    painter_->show_edits();
+}
+
+void Controller::take_picture(int width, int height) {
+    const bool of_run = document_->follows_run();
+    if (!of_run) document_->need_scene("picture");
+    const std::optional<ImageU8> taken = painter_->picture_alone(width, height, of_run);
+    if (!taken) return;
+    const fs::path file = free_picture_name();
+    write_png(file, *taken);
+    session_->tell("picture in " + file.string());
+}
+
+// Not with edits that are not saved, without a question.
+void Controller::quit() {
+    if (session_->scene && session_->edit.unsaved())
+        session_->leaving = Leaving{true, {}};
+    else
+        session_->for_window.push_back(WindowRequest::close);
+}
+
+void Controller::leave() {
+    if (!session_->leaving) return;
+    const Leaving leaving = *std::exchange(session_->leaving, std::nullopt);
+    if (leaving.quit)
+        session_->for_window.push_back(WindowRequest::close);
+    else
+        document_->load(leaving.open, true);
+}
+
+// Where it cannot be saved one stays, with the message.
+void Controller::save_and_leave() {
+    const std::optional<Leaving> leaving = std::exchange(session_->leaving, std::nullopt);
+    document_->save_scene(*device_);
+    session_->leaving = leaving;
+    leave();
+}
+
+}  // namespace darb

@@ -1,0 +1,390 @@
+// The pictures of a scene, each frame's as its pacing wants it, and what they cost.
+#include "viewer/painter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "engine/core/error.h"
+#include "viewer/seconds.h"
+#include "viewer/view_camera.h"
+
+namespace darb {
+
+namespace {
+
+constexpr double kLong_ms = 500;            // for a whole picture
+constexpr std::size_t kFewSplats = 20'000;  // half of them are always drawn
+constexpr double kQuick_ms = 20;            // it will be drawn in motion, too
+constexpr size_t kTimesKept = 60;           // frames in motion that the panel averages over
+constexpr int kRehearsals = 9;              // of motion; the first compiles
+constexpr double kRehearsing_ms = 40;       // of a frame: the window is to answer meanwhile
+
+double milliseconds_since(std::chrono::steady_clock::time_point start) {
+    return 1000 * seconds_since(start);
+}
+
+}  // namespace
+
+Painter::Painter(Device& device, Session& session, PainterOptions options, GLFWwindow* window)
+    : device_(&device),
+      session_(&session),
+      options_(std::move(options)),
+      canvas_(device),
+      gui_(device, canvas_.render_pass(), options_.gui_scale, window),
+      picture_(device),
+      panes_(device) {}
+
+Painter::~Painter() = default;
+
+void Painter::open(const Scene& scene) {
+    picture_.set_scene(scene.model, scene.bounds, scene.important);
+    warm_up_.reset();
+    lose_scene("another scene was opened");
+    begin_motion();
+    shown_model_ = shown_edit_ = 0;
+}
+
+void Painter::begin_motion() {
+    shares_ = picture_.most_moving() < 1
+                  ? motion_shares(picture_.splat_count(), picture_.most_moving())
+                  : std::vector<double>();
+    pacing_.motion().start(shares_);
+}
+
+// Until the warm-up is over the run's last picture stays, and the window lives.
+void Painter::begin_scene(bool of_run) {
+    constexpr int kSize = 256;  // px
+    if (of_run && options_.second_device && live_size_.x > 0)
+        warm_up_ = std::make_unique<WarmUp>(
+            *device_, *options_.second_device, session_->scene->model, shown_displays(),
+            session_->navigation.camera(kSize, kSize), options_.wake);
+    else
+        live_size_ = {0, 0};
+}
+
+void Painter::end_warm_up() {
+    warm_pipelines_ = warm_up_->take_pipelines();
+    warm_up_.reset();
+    live_size_ = {0, 0};
+    pacing_.forget();
+}
+
+// The frames of an export, and the pictures of a measurement, are of one scene.
+void Painter::lose_scene(const char* why) {
+    const std::string note = work_.lose_scene(why);
+    if (!note.empty()) session_->tell(note);
+    lose_levels();
+    ++version_;
+}
+
+// While a hand moves splats, only they are made anew; all else follows when it lets go.
+void Painter::show_edits() {
+    const Edit& edit = session_->edit;
+    const Scene& scene = *session_->scene;
+    if (std::exchange(shown_edit_, edit.seen_version()) != edit.seen_version())
+        lose_scene("the scene was edited");
+    if (edit.model_version() != shown_model_) {
+        if (edit.transforms()) {
+            picture_.update_scene();
+        } else {
+            picture_.set_scene(scene.model, scene.bounds, scene.important);
+            begin_motion();
+        }
+        shown_model_ = edit.model_version();
+    }
+    show_marks(!work_.draws());
+}
+
+// The highlight of a selection is for who edits: not in pictures that are written or measured.
+void Painter::show_marks(bool highlight) {
+    const Edit& edit = session_->edit;
+    highlights_ = highlight;
+    lose_levels();  // they have none
+    ++version_;
+    picture_.set_marks(edit.unseen(),
+                       highlight ? edit.selected() : SplatMask(edit.selected().size(), 0));
+}
+
+void Painter::begin_run() {
+    shares_.clear();
+    pacing_.motion().start({});
+}
+
+void Painter::show_picture_of_run(const LiveMade& made) {
+    if (made.pixels.empty()) return;
+    if (live_pixels_.bytes() < made.pixels.size() * 4)
+        live_pixels_ = Buffer(*device_, "live picture", made.pixels.size() * 4);
+    live_pixels_.upload(made.pixels);
+    live_size_ = {made.width, made.height};
+    session_->panes.psnr_db = made.psnr_db;
+    FrameTimes& t = session_->times;
+    t.passes = made.passes;
+    t.picture_ms = made.ms;
+    t.quality = made.quality;
+    if (made.whole) t.full_ms = made.ms;
+    t.visible = made.visible;
+    t.intersections = made.intersections;
+}
+
+void Painter::begin(int width, int height) {
+    frame_start_ = Clock::now();
+    take_levels();
+    if (warm_up_ && warm_up_->done()) end_warm_up();
+    if (at_rest()) warm_pipelines_.clear();  // the pictures have them
+    canvas_.resize(width, height);
+    gui_.begin(width, height);
+}
+
+void Painter::paint(const PaintedFrame& frame) {
+    const bool works = work_.draws();
+    step_work();
+    if (!frame.of_run) load_current_photo();  // of a run whoever draws reads it
+    pacing_.skip();
+    if (!frame.of_run && !picture_.empty() && !warm_up_) pace_picture(frame, works);
+}
+
+double Painter::seconds_to_next() {
+    if (pacing_.rehearses() && rehearsals_ > 0) return 0;
+    const double refine_s = pacing_.seconds_to_refine(frame_start_);
+    if (!picture_.empty() && std::isfinite(refine_s)) return refine_s;
+    return pacing_.count_still_frame();
+}
+
+bool Painter::at_rest() const {
+    return !warm_up_ && pacing_.is_whole() && ready_to_move() && rehearsals_ == 0;
+}
+
+void Painter::compose() {
+    canvas_.compose(shown(), session_->display.background,
+                    [this](VkCommandBuffer commands) { gui_.draw(commands); });
+}
+
+// Where a picture in motion cannot have all splats. Another scene and edits end them.
+void Painter::start_levels() {
+    if (levels_ || !session_->scene || shares_.empty() || !pacing_.is_whole()) return;
+    if (session_->edit.selected_count() > 0 || session_->edit.transforms())
+        return;  // they have none
+    if (pacing_.motion().quality().splats == 1 || session_->times.full_ms < kQuick_ms) return;
+    const Scene& s = *session_->scene;
+    if (s.model.size() < kFewSplats) return;
+    std::vector<std::size_t> counts;
+    for (const double share : shares_)
+        counts.push_back(static_cast<std::size_t>(share * static_cast<double>(s.model.size())));
+    levels_ =
+        std::make_unique<MotionLevels>(s.model, session_->edit.unseen(), counts, options_.wake);
+}
+
+void Painter::take_levels() {
+    std::erase_if(ended_, [](const auto& job) { return job->done(); });
+    if (!levels_ || picture_.levels_ended()) return;
+    const bool done = levels_->done();
+    try {
+        while (const std::optional<SplatModel> level = levels_->take()) picture_.add_level(*level);
+    } catch (const NoRoom&) {  // no room: the important splats do without it
+        levels_->cancel();
+    }
+    if (done) picture_.end_levels();
+}
+
+void Painter::lose_levels() {
+    if (!levels_) return;
+    levels_->cancel();
+    ended_.push_back(std::move(levels_));
+}
+
+void Painter::load_current_photo() {
+    Photos& p = session_->photos;
+    const bool wanted = p.compare || session_->display.mode == VIEW_ERROR;
+    if (p.current < 0 || !wanted || p.loaded == p.current || p.failed) return;
+    if (session_->attempt([&] { load_photo_of_view(*device_, p); })) {
+        ++version_;
+        return;
+    }
+    p.failed = true;
+    p.compare = false;
+    if (session_->display.mode == VIEW_ERROR) session_->display.mode = VIEW_COLOUR;
+}
+
+void Painter::pace_picture(const PaintedFrame& frame, bool works) {
+    const Photos& photos = session_->photos;
+    const PictureKey key{camera_in_window(photos, session_->navigation,
+                                          free_area(*session_, frame.width, frame.height)),
+                         session_->display,
+                         photos.current,
+                         photo_beside(photos, session_->display),
+                         session_->panes.kernels,
+                         version_};
+    if (!ready_to_move()) rehearsals_ = kRehearsals;
+    const PicturePacing::Frame paced{
+        frame.full, works,
+        session_->times.full_ms > kLong_ms && picture_.most_moving() < 1 && ready_to_move(),
+        session_->error.empty() && rehearsals_ > 0};
+    const PictureStep step = pacing_.next(key, paced, frame_start_);
+    if (step == PictureStep::rehearsal)
+        rehearse_motion(key);
+    else if (step != PictureStep::none)
+        draw_picture(key, step);
+    compose_panes();
+    if (!works) start_levels();
+}
+
+std::vector<DisplaySettings> Painter::shown_displays() const {
+    return pane_displays(session_->display,
+                         kernels_beside(session_->panes, session_->display.kernel));
+}
+
+bool Painter::ready_to_move() const {
+    const std::vector<DisplaySettings> displays = shown_displays();
+    for (size_t i = 0; i < displays.size(); ++i)
+        if (!picture_.ready_to_move(displays[i], static_cast<int>(i))) return false;
+    return true;
+}
+
+void Painter::render_shown(const Camera& camera, const WindowArea& area,
+                           std::optional<double> moving) {
+    const std::vector<DisplaySettings> displays = shown_displays();
+    const bool photo_first = photo_beside(session_->photos, session_->display);
+    shows_panes_ = photo_first || displays.size() > 1;  // also where it fails
+    panes_.render_all(picture_, camera, displays, overlay_of(session_->photos, camera, area),
+                      photo_first, moving);
+}
+
+void Painter::compose_panes() {
+    const WindowArea area = free_area(*session_, canvas_.width(), canvas_.height());
+    fit_lines(shows_panes_ ? panes_.count() : 0, session_->panes,
+              compared_strip(session_->photos, session_->display, area));
+    if (shows_panes_) session_->attempt([&] { panes_.compose(session_->panes); });
+}
+
+BufferPicture Painter::shown() const {
+    if ((picture_.empty() || warm_up_) && live_size_.x > 0)
+        return {&live_pixels_, live_size_.x, live_size_.y};
+    return drawn();
+}
+
+BufferPicture Painter::drawn() const {
+    if (picture_.empty()) return {};
+    if (shows_panes_) return {&panes_.pixels(), panes_.width(), panes_.height()};
+    return {&picture_.pixels(), picture_.width(), picture_.height()};
+}
+
+// All but the whole one are replaced soon.
+void Painter::draw_picture(const PictureKey& key, PictureStep step) {
+    const auto start = Clock::now();
+    const bool whole = step == PictureStep::whole;
+    const MotionQuality quality = whole ? MotionQuality()
+                                  : step == PictureStep::preview
+                                      ? MotionQuality{1, picture_.most_moving()}
+                                      : pacing_.motion().quality();
+    const Camera camera = at_scale(key.camera, quality.scale);
+    pacing_.drew(step, quality);
+    if (step == PictureStep::in_motion) rehearsals_ = 0;  // it measures the same
+    const bool drawn = session_->attempt([&] {
+        render_shown(camera, free_area(*session_, key.camera.width, key.camera.height),
+                     whole ? std::nullopt : std::optional(quality.splats));
+    });
+    session_->panes.psnr_db.clear();
+    if (!drawn) return pacing_.failed();
+    FrameTimes& t = session_->times;
+    t.passes = shows_panes_ ? panes_.pass_times() : picture_.pass_times();
+    t.picture_ms = milliseconds_since(start);
+    if (whole && shows_panes_) session_->panes.psnr_db = panes_.psnr_db();
+    if (whole) t.full_ms = t.picture_ms;
+    t.quality = quality;
+    t.visible = picture_.status().visible;
+    t.intersections = picture_.status().intersections;
+    if (session_->plan && whole)
+        session_->plan->note_frame(picture_.status().huge_splats, picture_.status().longest_list);
+}
+
+// After what a picture needs has changed: pipelines compile at their first use, and the first
+// frames in motion are drawn at a quality that was found before them.
+void Painter::rehearse_motion(const PictureKey& key) {
+    const auto begin = Clock::now();
+    const bool first = rehearsals_ == kRehearsals;
+    const FrameTimes& t = session_->times;
+    if (first) besides_picture_ms_ = std::max(0.0, t.frame_ms - t.picture_ms);
+    session_->attempt([&] {
+        do {
+            const MotionQuality quality = pacing_.motion().quality();
+            // The first makes the copy of the important splats, also where all are wanted now.
+            rehearse_once(key, quality,
+                          rehearsals_ == kRehearsals
+                              ? std::min(quality.splats, picture_.most_moving())
+                              : quality.splats);
+        } while (--rehearsals_ > 0 && !first && milliseconds_since(begin) < kRehearsing_ms);
+    });
+}
+
+void Painter::rehearse_once(const PictureKey& key, const MotionQuality& quality, double splats) {
+    const auto start = Clock::now();
+    const std::vector<DisplaySettings> displays = shown_displays();
+    std::vector<PassTime> passes;
+    bool compiled = false;
+    for (size_t p = 0; p < displays.size(); ++p) {
+        add_times(picture_.rehearse(at_scale(key.camera, quality.scale), displays[p], splats,
+                                    static_cast<int>(p)),
+                  passes);
+        compiled |= picture_.compiled();
+    }
+    if (compiled || splats < quality.splats) return;
+    pacing_.motion().measured(motion_cost(besides_picture_ms_ + milliseconds_since(start), passes));
+}
+
+void Painter::presented() {
+    FrameTimes& t = session_->times;
+    t.frame_ms = milliseconds_since(frame_start_);
+    if (!pacing_.in_motion() || (shows_panes_ ? panes_.compiled() : picture_.compiled())) return;
+    pacing_.motion().measured(motion_cost(t.frame_ms, t.passes));
+    t.moving_ms.push_back(t.frame_ms);
+    if (t.moving_ms.size() > kTimesKept) t.moving_ms.pop_front();
+}
+
+std::optional<ImageU8> Painter::picture_alone(int width, int height, bool of_run) {
+    if (!of_run) {
+        if (session_->edit.selected_count() > 0) show_marks(false);  // until step_work
+        const WindowArea area = free_area(*session_, width, height);
+        render_shown(camera_in_window(session_->photos, session_->navigation, area), area, {});
+        compose_panes();
+    }
+    const BufferPicture taken = of_run ? shown() : drawn();
+    if (taken.pixels == nullptr || taken.width == 0) return {};  // of a run that has drawn none
+    return read_pixels(*taken.pixels, taken.width, taken.height);
+}
+
+void Painter::start_export() {
+    const PathState& p = session_->path;
+    work_.start_export(p.path,
+                       {p.folder, p.fps, p.export_width, p.export_height, session_->display});
+}
+
+void Painter::start_measure(int width, int height) {
+    const WindowArea area = free_area(*session_, width, height);
+    work_.start_measure(camera_in_window(session_->photos, session_->navigation, area),
+                        session_->display, session_->own);
+}
+
+void Painter::step_export(bool wait) {
+    const std::optional<std::string> summary = work_.step_export(picture_, wait);
+    if (!summary) return;
+    session_->tell(*summary);
+    pacing_.unsettle(PicturePacing::kSettlingFrames + 1);  // the panels say so
+}
+
+void Painter::step_work() {
+    if (highlights_ == work_.draws() && session_->edit.selected_count() > 0)
+        show_marks(!work_.draws());
+    if (work_.draws()) {  // the picture is one of its own then
+        pacing_.forget();
+        shows_panes_ = false;
+    }
+    if (work_.exports()) session_->attempt([&] { step_export(false); });
+    if (work_.measures())
+        session_->attempt([&] { session_->measured = work_.step_measure(picture_); });
+    session_->progress.exporting = work_.export_share();
+    session_->progress.measuring = work_.measure_share();
+}
+
+}  // namespace darb
