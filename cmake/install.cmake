@@ -17,6 +17,7 @@ install(TARGETS darb_library darb_options darb_shaders darb_core darb_ranks darb
 install(EXPORT darb NAMESPACE darb:: FILE darb-targets.cmake DESTINATION ${package} COMPONENT dev)
 install(DIRECTORY engine trainer DESTINATION ${headers} COMPONENT dev FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY shaders/shared DESTINATION ${headers}/shaders COMPONENT dev FILES_MATCHING PATTERN "*.h")
+install(FILES ${PROJECT_BINARY_DIR}/generated/constants/darb_constant_names.h DESTINATION ${headers} COMPONENT dev)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/generated/darb-config-version.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES cmake/darb-config.cmake ${PROJECT_BINARY_DIR}/generated/darb-config-version.cmake

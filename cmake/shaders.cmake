@@ -38,3 +38,15 @@ std::span<const ShaderBinary> shader_table() {
   target_include_directories(${target} PRIVATE ${out})
   target_link_libraries(${target} PUBLIC darb_options)
 endfunction()
+
+# darb_constant_names(TARGET): the names of all specialization constants, generated for engine/gpu/constant_name.h, which
+# TARGET has. What links it is compiled after them.
+function(darb_constant_names target)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/shaders/*.comp ${PROJECT_SOURCE_DIR}/shaders/*.glsl)
+  set(script ${PROJECT_SOURCE_DIR}/cmake/constant_names.cmake)
+  set(folder ${PROJECT_BINARY_DIR}/generated/constants)
+  add_custom_command(OUTPUT ${folder}/darb_constant_names.h DEPENDS ${sources} ${script} VERBATIM
+    COMMAND ${CMAKE_COMMAND} -DROOT=${PROJECT_SOURCE_DIR} -DOUT=${folder}/darb_constant_names.h -P ${script})
+  target_sources(${target} PRIVATE ${folder}/darb_constant_names.h)
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${folder}>)
+endfunction()

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
-#include <set>
 #include <utility>
 
 #include "engine/core/error.h"
@@ -39,17 +38,6 @@ bool declares_constant(const ShaderInterface& shader, std::string_view name) {
                        [&](const auto& constant) { return constant.name == name; });
 }
 
-bool any_shader_declares(std::string_view name) {
-    static const std::set<std::string, std::less<>> all = [] {
-        std::set<std::string, std::less<>> names;
-        for (const ShaderBinary& shader : shader_table())
-            for (const auto& constant : interface_of(std::string(shader.name)).constants)
-                names.insert(constant.name);
-        return names;
-    }();
-    return all.contains(name);
-}
-
 std::string names_of_constants(const ShaderInterface& shader) {
     std::string names;
     for (const auto& constant : shader.constants)
@@ -61,14 +49,10 @@ std::string names_of_constants(const ShaderInterface& shader) {
 PipelineKey declared(PipelineKey key) {
     const ShaderInterface& shader = interface_of(key.shader);
     std::erase_if(key.constants, [&](const auto& given) {
-        if (declares_constant(shader, given.first)) return false;
+        if (declares_constant(shader, given.first.text())) return false;
         DARB_CHECK(given.second.shared,
                    "shader {} declares no specialization constant {}; it declares {}", key.shader,
-                   given.first, names_of_constants(shader));
-        DARB_CHECK(any_shader_declares(given.first),
-                   "specialization constant {}, given to shader {} by a table for several passes, "
-                   "is declared by no shader",
-                   given.first, key.shader);
+                   given.first.text(), names_of_constants(shader));
         return true;
     });
     for (auto& given : key.constants) given.second.shared = false;
@@ -88,6 +72,12 @@ std::uint32_t bits_of(const SpecValue& given, const ShaderInterface::Constant& c
     return static_cast<std::uint32_t>(*integer);
 }
 
+const SpecValue* find_given(const SpecConstants& given, std::string_view name) {
+    for (const auto& [known, value] : given)
+        if (known.text() == name) return &value;
+    return nullptr;
+}
+
 // Constants given by name, as Vulkan wants them by id. Keeps the memory that info points to.
 struct Specialization {
     std::vector<std::uint32_t> data;
@@ -98,10 +88,10 @@ struct Specialization {
                    std::string_view name) {
         threads_x = shader.local_size[0];
         for (const ShaderInterface::Constant& constant : shader.constants) {
-            const auto found = given.find(constant.name);
-            if (found == given.end()) continue;
+            const SpecValue* found = find_given(given, constant.name);
+            if (found == nullptr) continue;
             entries.push_back({constant.id, static_cast<std::uint32_t>(data.size() * 4), 4});
-            data.push_back(bits_of(found->second, constant, name));
+            data.push_back(bits_of(*found, constant, name));
             if (shader.local_size_spec_id[0] == constant.id) threads_x = data.back();
         }
     }
@@ -129,10 +119,10 @@ std::uint32_t fitting_subgroup_size(const DeviceInfo& info, std::uint32_t thread
 std::string given_constants(const ShaderInterface& shader, const SpecConstants& given) {
     std::string text;
     for (const ShaderInterface::Constant& constant : shader.constants) {
-        const auto found = given.find(constant.name);
-        if (found == given.end()) continue;
+        const SpecValue* found = find_given(given, constant.name);
+        if (found == nullptr) continue;
         text += fmt::format("{}{}=", text.empty() ? "" : " ", constant.name);
-        std::visit([&](auto value) { text += fmt::format("{}", value); }, found->second.value);
+        std::visit([&](auto value) { text += fmt::format("{}", value); }, found->value);
     }
     return text;
 }

@@ -6,6 +6,7 @@
 #include <compare>
 #include <concepts>
 #include <cstdint>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -14,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "engine/gpu/constant_name.h"
 #include "engine/gpu/device.h"
 
 namespace darb {
@@ -30,12 +32,21 @@ struct SpecValue {
     auto operator<=>(const SpecValue&) const = default;
 };
 
-/// Name in GLSL -> value. A pipeline aborts on a name that its shader does not declare: misspelt,
-/// it would leave the shader's default in place without a word.
-using SpecConstants = std::map<std::string, SpecValue, std::less<>>;
+/// Name in GLSL -> value. A pipeline aborts on a name that its shader does not declare, as that
+/// would leave the shader's default in place without a word.
+class SpecConstants : public std::map<ConstantName, SpecValue> {
+  public:
+    struct Entry {
+        ConstantName name;
+        SpecValue value;
+    };
+    SpecConstants() = default;
+    SpecConstants(std::initializer_list<Entry> entries) {
+        for (const Entry& entry : entries) (*this)[entry.name] = entry.value;
+    }
+};
 
-/// The same values for passes of which each takes those that its shader declares. A name that no
-/// shader at all declares still aborts.
+/// The same values for passes of which each takes those that its shader declares.
 SpecConstants for_several_passes(SpecConstants constants);
 
 /// In place of a size: the driver chooses one for each shader, as many lanes as it has registers

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <regex>
@@ -202,7 +203,9 @@ std::string specialized(const std::string& line, const SpecConstants& constants)
     static const std::regex declaration(R"(layout\(constant_id = \d+\) const (\w+) (\w+) = (.*);)");
     std::smatch match;
     if (!std::regex_match(line, match, declaration)) return line;
-    const auto found = constants.find(match.str(2));
+    const auto found = std::find_if(constants.begin(), constants.end(), [&](const auto& given) {
+        return given.first.text() == match.str(2);
+    });
     std::string value = found == constants.end() ? match.str(3) : constant_text(found->second);
     return fmt::format("const {0} {1} = {0}({2});", match.str(1), match.str(2), value);
 }

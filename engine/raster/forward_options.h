@@ -35,7 +35,7 @@ inline constexpr int kNoEffect = -1;
 /// A row for each switch: plans, options, files and the viewer follow this table.
 struct ProjectionSwitch {
     bool ProjectionEffects::*on;
-    const char* constant;    // of shaders/effects/constants.glsl
+    ConstantName constant;   // of shaders/effects/constants.glsl
     int effect = kNoEffect;  // EFFECT_* that turns it on
 };
 inline constexpr ProjectionSwitch kProjectionSwitches[] = {

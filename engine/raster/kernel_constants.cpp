@@ -21,6 +21,32 @@ constexpr float kUnbounded = 3e38f;  // R^2 of the Gaussian
 // whose reach is the closed form's.
 constexpr double kRoundingMargin = 1e-6, kBuiltinMargin = 1e-4;
 
+constexpr ConstantName kCoefficients[] = {"KERNEL_C0", "KERNEL_C1", "KERNEL_C2",
+                                          "KERNEL_C3", "KERNEL_C4", "KERNEL_C5",
+                                          "KERNEL_C6", "KERNEL_C7", "KERNEL_C8"};
+
+/// Of the second kernel of a blend, and what the same is of the first.
+struct NameInBlend {
+    ConstantName second, first;
+};
+constexpr NameInBlend kNamesInBlend[] = {
+    {"BLEND_FORM", "KERNEL_FORM"},
+    {"BLEND_DEGREE", "KERNEL_DEGREE"},
+    {"BLEND_HALF_POWER", "KERNEL_HALF_POWER"},
+    {"BLEND_SQUARED_VARIABLE", "KERNEL_SQUARED_VARIABLE"},
+    {"BLEND_SUPPORT", "KERNEL_SUPPORT"},
+    {"BLEND_INVERSE_SUPPORT", "KERNEL_INVERSE_SUPPORT"},
+    {"BLEND_C0", "KERNEL_C0"},
+    {"BLEND_C1", "KERNEL_C1"},
+    {"BLEND_C2", "KERNEL_C2"},
+    {"BLEND_C3", "KERNEL_C3"},
+    {"BLEND_C4", "KERNEL_C4"},
+    {"BLEND_C5", "KERNEL_C5"},
+    {"BLEND_C6", "KERNEL_C6"},
+    {"BLEND_C7", "KERNEL_C7"},
+    {"BLEND_C8", "KERNEL_C8"},
+};
+
 /// Those of the first kernel, and what shaders/kernels/blend.glsl wants of the second.
 SpecConstants blend_constants(int kernel, Footprint footprint, int degree, float alpha_cutoff) {
     const auto [first, second] = *blend_parts(kernel);
@@ -29,20 +55,17 @@ SpecConstants blend_constants(int kernel, Footprint footprint, int degree, float
     };
     SpecConstants constants = of(first);
     const SpecConstants other = of(second);
-    for (const char* name :
-         {"FORM", "DEGREE", "HALF_POWER", "SQUARED_VARIABLE", "SUPPORT", "INVERSE_SUPPORT", "C0",
-          "C1", "C2", "C3", "C4", "C5", "C6", "C7", "C8"})
-        constants.emplace(std::string("BLEND_") + name, other.at(std::string("KERNEL_") + name));
+    for (const NameInBlend& name : kNamesInBlend) constants[name.second] = other.at(name.first);
     const BlendFacts& facts = blend_facts(kernel);
-    const auto put = [&](const char* name, double value) {
-        constants.emplace(name, static_cast<float>(value));
+    const auto put = [&](ConstantName name, double value) {
+        constants[name] = static_cast<float>(value);
     };
     put("BLEND_CENTRE_RATIO", facts.centre[1] / facts.centre[0]);
     put("BLEND_FOURTH_1", facts.fourth[0]);
     put("BLEND_FOURTH_2", facts.fourth[1]);
     put("BLEND_SECOND_1", facts.second[0]);
     put("BLEND_SECOND_2", facts.second[1]);
-    constants.emplace("BLENDED", 1);
+    constants["BLENDED"] = 1;
     constants["KERNEL_REACH_MARGIN"] = static_cast<float>(kBuiltinMargin);
     return for_several_passes(std::move(constants));
 }
@@ -87,7 +110,7 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
         {"KERNEL_REACH_MARGIN", static_cast<float>(margin)},
     };
     for (std::size_t i = 0; i < k.c.size(); ++i)
-        constants.emplace("KERNEL_C" + std::to_string(i), static_cast<float>(k.c[i]));
+        constants[kCoefficients[i]] = static_cast<float>(k.c[i]);
     return for_several_passes(std::move(constants));
 }
 

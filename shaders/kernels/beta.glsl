@@ -21,7 +21,7 @@ float log2_of_rest(float t) {
 float power_of_two(float y) {
     const float above = max(y, -126.0), n = roundEven(above);
     float p, dp;
-    kernel_polynomial(above - n, p, dp);
+    kernel_polynomial(first_kernel(), above - n, p, dp);
     return intBitsToFloat(floatBitsToInt(p) + (int(n) << 23));
 }
 

@@ -21,67 +21,16 @@ layout(constant_id = 186) const float BLEND_C6 = 0.0;
 layout(constant_id = 187) const float BLEND_C7 = 0.0;
 layout(constant_id = 188) const float BLEND_C8 = 0.0;
 
-#define KERNEL_DEGREE BLEND_DEGREE
-#define KERNEL_HALF_POWER BLEND_HALF_POWER
-#define KERNEL_SQUARED_VARIABLE BLEND_SQUARED_VARIABLE
-#define KERNEL_SUPPORT BLEND_SUPPORT
-#define KERNEL_INVERSE_SUPPORT BLEND_INVERSE_SUPPORT
-#define KERNEL_C0 BLEND_C0
-#define KERNEL_C1 BLEND_C1
-#define KERNEL_C2 BLEND_C2
-#define KERNEL_C3 BLEND_C3
-#define KERNEL_C4 BLEND_C4
-#define KERNEL_C5 BLEND_C5
-#define KERNEL_C6 BLEND_C6
-#define KERNEL_C7 BLEND_C7
-#define KERNEL_C8 BLEND_C8
-#define polynomial_step blend_polynomial_step
-#define kernel_polynomial blend_polynomial
-#define compact_power blend_compact_power
-#define compact_value_slope blend_compact_value_slope
-#define gaussian_value_slope blend_gaussian_value_slope
-#define quadric_integral blend_quadric_integral
-#define quadric_value_slope blend_quadric_value_slope
-#include "kernels/polynomial.glsl"
-#include "kernels/compact.glsl"
-#include "kernels/gaussian.glsl"
-#include "kernels/quadric.glsl"
-
-void second_value_slope(float q, out float w, out float slope) {
-    if (BLEND_FORM == KERNEL_FORM_COMPACT)
-        compact_value_slope(q, w, slope);
-    else if (BLEND_FORM == KERNEL_FORM_GAUSSIAN)
-        gaussian_value_slope(q, w, slope);
-    else
-        quadric_value_slope(q, w, slope);
+KernelParameters second_kernel() {
+    return KernelParameters(
+        BLEND_FORM, BLEND_DEGREE, BLEND_HALF_POWER, BLEND_SQUARED_VARIABLE, BLEND_SUPPORT, BLEND_INVERSE_SUPPORT,
+        float[](BLEND_C0, BLEND_C1, BLEND_C2, BLEND_C3, BLEND_C4, BLEND_C5, BLEND_C6, BLEND_C7, BLEND_C8));
 }
-
-#undef KERNEL_DEGREE
-#undef KERNEL_HALF_POWER
-#undef KERNEL_SQUARED_VARIABLE
-#undef KERNEL_SUPPORT
-#undef KERNEL_INVERSE_SUPPORT
-#undef KERNEL_C0
-#undef KERNEL_C1
-#undef KERNEL_C2
-#undef KERNEL_C3
-#undef KERNEL_C4
-#undef KERNEL_C5
-#undef KERNEL_C6
-#undef KERNEL_C7
-#undef KERNEL_C8
-#undef polynomial_step
-#undef kernel_polynomial
-#undef compact_power
-#undef compact_value_slope
-#undef gaussian_value_slope
-#undef quadric_integral
-#undef quadric_value_slope
 
 // From w and slope of the first those of the blend, and dw/dm.
 void blend_value_slope(float q, float m, inout float w, inout float slope, out float by_exponent) {
     float w2, slope2;
-    second_value_slope(q, w2, slope2);
+    form_value_slope(second_kernel(), q, w2, slope2);
     by_exponent = w2 - w;
     w += m * by_exponent;
     slope += m * (slope2 - slope);

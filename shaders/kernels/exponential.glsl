@@ -17,7 +17,7 @@ float log2_steady(float x) {
 float power_in_pairs(float y) {
     const float n = roundEven(y), f = y - n, f2 = f * f;
     float p = KERNEL_C0 + KERNEL_C1 * f + f2 * (KERNEL_C2 + KERNEL_C3 * f + f2 * (KERNEL_C4 + KERNEL_C5 * f)), dp;
-    if (KERNEL_DEGREE > 5) kernel_polynomial(f, p, dp);
+    if (KERNEL_DEGREE > 5) kernel_polynomial(first_kernel(), f, p, dp);
     return intBitsToFloat(floatBitsToInt(p) + (int(n) << 23));
 }
 

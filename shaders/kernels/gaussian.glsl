@@ -2,13 +2,13 @@
 // P(1/2) = 2 P(-1/2), so w is 1 at the centre and has no jump. Below 2^-126 it stays there. The
 // slope -w/2 is the derivative of the polynomial up to the latter's own error, which is below rounding from degree 5
 // on; shorter polynomials have their own derivative.
-void gaussian_value_slope(float q, out float w, out float slope) {
+void gaussian_value_slope(const KernelParameters k, float q, out float w, out float slope) {
     const float y = max(q * -0.72134752, -126.0);  // -log2(e)/2
     const float n = roundEven(y);
     float p, dp;
-    kernel_polynomial(y - n, p, dp);
+    kernel_polynomial(k, y - n, p, dp);
     w = intBitsToFloat(floatBitsToInt(p) + (int(n) << 23));
     slope = -0.5 * w;
-    if (KERNEL_DEGREE < 5)
+    if (k.degree < 5)
         slope = -0.72134752 * intBitsToFloat(floatBitsToInt(dp) + (int(n) << 23));
 }

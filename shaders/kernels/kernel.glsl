@@ -33,12 +33,32 @@ layout(constant_id = 126) const float KERNEL_C6 = 0.0;
 layout(constant_id = 127) const float KERNEL_C7 = 0.0;
 layout(constant_id = 128) const float KERNEL_C8 = 0.0;
 
+#include "kernels/parameters.glsl"
+
+// The kernel; of a blend of two the first.
+KernelParameters first_kernel() {
+    return KernelParameters(
+        KERNEL_FORM, KERNEL_DEGREE, KERNEL_HALF_POWER, KERNEL_SQUARED_VARIABLE, KERNEL_SUPPORT, KERNEL_INVERSE_SUPPORT,
+        float[](KERNEL_C0, KERNEL_C1, KERNEL_C2, KERNEL_C3, KERNEL_C4, KERNEL_C5, KERNEL_C6, KERNEL_C7, KERNEL_C8));
+}
+
 #include "kernels/polynomial.glsl"
 
 #include "kernels/builtin.glsl"
 #include "kernels/compact.glsl"
 #include "kernels/gaussian.glsl"
 #include "kernels/quadric.glsl"
+
+// Of the forms that have no shape of each splat.
+void form_value_slope(const KernelParameters k, float q, out float w, out float slope) {
+    if (k.form == KERNEL_FORM_COMPACT)
+        compact_value_slope(k, q, w, slope);
+    else if (k.form == KERNEL_FORM_GAUSSIAN)
+        gaussian_value_slope(k, q, w, slope);
+    else
+        quadric_value_slope(k, q, w, slope);
+}
+
 #include "kernels/shaped.glsl"
 
 // Of a fixed kernel, or of a blend of two. Apart, so that a shader has few copies of all kernels: drivers inline
@@ -46,12 +66,8 @@ layout(constant_id = 128) const float KERNEL_C8 = 0.0;
 void fixed_value_slope(float q, float exponent, out float w, out float slope, inout float by_exponent) {
     if (EVALUATION == EVALUATION_BUILTIN && BLENDED == 0 && builtin_exists())
         builtin_value_slope(q, w, slope);
-    else if (KERNEL_FORM == KERNEL_FORM_COMPACT)
-        compact_value_slope(q, w, slope);
-    else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN)
-        gaussian_value_slope(q, w, slope);
     else
-        quadric_value_slope(q, w, slope);
+        form_value_slope(first_kernel(), q, w, slope);
     if (BLENDED == 1) blend_value_slope(q, exponent, w, slope, by_exponent);
 }
 

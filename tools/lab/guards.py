@@ -88,7 +88,7 @@ GUARDS = [
      "w = inside ? max(w, 0.0) : 0.0;", "w = max(w, 0.0);",
      "kernel_test", "KernelShader.CentreEdgeAndBeyond_areExact"),
     ("q within 1e-6 of the support's edge", "edge_mask", "shaders/kernels/compact.glsl",
-     "min(q * KERNEL_INVERSE_SUPPORT, 1.0)", "q * KERNEL_INVERSE_SUPPORT",
+     "min(q * k.inverse_support, 1.0)", "q * k.inverse_support",
      "kernel_test", "KernelShader.CentreEdgeAndBeyond_areExact"),
     ("q within 1e-6 of the support's edge", "edge_of_beta", "shaders/kernels/beta.glsl",
      "w = inside ? w : 0.0;", "",
