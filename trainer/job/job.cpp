@@ -1,3 +1,5 @@
+#include "trainer/job/job.h"
+
 #include "engine/plan/tuning_names.h"
 
 #include <fmt/format.h>
