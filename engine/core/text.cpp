@@ -13,8 +13,8 @@ namespace {
 constexpr std::uint32_t kNoCharacter = 0xffffffff;
 
 struct Character {
-    std::uint32_t code =
-        kNoCharacter;  // Unicode code point; kNoCharacter for a byte that is not UTF-8
+    std::uint32_t code = kNoCharacter;  // Unicode code point; kNoCharacter for a byte that is not
+                                        // UTF-8
     std::size_t bytes = 1;
 };
 

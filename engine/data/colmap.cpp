@@ -411,8 +411,8 @@ PointCloud parse_colmap_points_text(std::string_view file, const std::string& wh
         while (!lines.rest().empty()) {
             points.seen_by.push_back(lines.number<std::uint32_t>("image id of the track"));
             const std::string_view word = lines.word("the point's index in the track");
-            std::uint32_t observation =
-                0xFFFFFFFFu;  // matches no observation where the word is not a number
+            std::uint32_t observation = 0xFFFFFFFFu;  // matches no observation where the word is
+                                                      // not a number
             std::from_chars(word.data(), word.data() + word.size(), observation);
             if (observations) observations->push_back(observation);
         }
@@ -636,8 +636,8 @@ std::string folder_that_has(const fs::path& root, const std::string& name) {
 }
 
 /// Looks beside the model and above it, within root; for a model folder given directly (or the
-/// folder of models that it is in), up to two folders above that as well. Where no folder is named
-/// images, takes the one that holds the photo `name`.
+/// folder of models that it is in), up to two folders above that as well. Where none of them has a
+/// folder named images, takes the one that itself holds the photo `name`.
 fs::path find_images_folder(const fs::path& root, const fs::path& model_folder,
                             const std::string& name, const DatasetOptions& options) {
     const fs::path base = tidy_path(fs::absolute(root)),
@@ -756,7 +756,8 @@ Dataset load_colmap(const fs::path& root, const fs::path& model_folder,
     for (View& view : dataset.views)
         if (view.photo.empty()) view.photo = images / view.name;
     if (options.require_photos) check_photos(dataset.views, root, model_folder);
-    // Masks lie beside the folder of the photos, or in it where the photos lie with the model.
+    // Masks and depths lie beside the folder of the photos, or in it where photos lie with the
+    // model.
     const bool with_model = images.filename() != fs::path(options.images_folder).filename();
     const fs::path around = with_model ? images : images.parent_path();
     add_masks(around, options, dataset);

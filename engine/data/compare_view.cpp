@@ -13,9 +13,9 @@ namespace darb {
 namespace {
 
 constexpr float kErrorGain = 4.0f;
-constexpr float kLeastCover =
-    0.5f;  // as in training: with less cover, there is no surface to compare
-constexpr double kEqual_db = 100;  // reported for a render that equals its photo
+constexpr float kLeastCover = 0.5f;  // as in training: with less cover, there is no surface to
+                                     // compare
+constexpr double kEqual_db = 100;    // reported for a render that equals its photo
 
 }  // namespace
 

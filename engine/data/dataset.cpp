@@ -26,8 +26,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double kStrayPoints =
-    0.01;  // share of the points that may lie before the others by mistake
+constexpr double kStrayPoints = 0.01;  // share of the points that may lie before the others by
+                                       // mistake
 constexpr size_t kPointsLookedAt = 20'000;
 constexpr double kExtentMargin = 1.1;
 constexpr double kLeastExtent = 1e-9;  // world units: below this, the cameras stand in one place
@@ -154,7 +154,7 @@ void note_transforms_beside(const fs::path& path, const fs::path& model,
                           differs, model.string()));
 }
 
-// Loads the COLMAP model that nerfstudio leaves beside its transforms.json, which names the photos
+// Loads the COLMAP model that nerfstudio leaves below its transforms.json, which names the photos
 // as COLMAP saw them, or the transforms.json itself. The choice depends on the photos alone, so
 // that loading cameras without photos (require_photos false) gives the cameras that were trained
 // on.

@@ -91,8 +91,7 @@ struct Dataset {
     PointCloud start;         // training starts from these instead of points, unless empty
     bool has_alpha = false;   // some photo has an alpha channel, a mask, or gaps from undistortion
     double depth_scale = 1;   // world units a metre, for the measured depths
-    PhotoDetail
-        detail;  // detail of the photos; per_pixel and opaque are 0 where it was not measured
+    PhotoDetail detail;       // detail of the photos; 0 where it was not measured
     bool alpha_is_mask = false;      // some alpha comes from masks or gaps: pixels to leave out
     std::vector<std::string> notes;  // what was skipped, scaled or dropped, one sentence each
 };

@@ -24,12 +24,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr float kOneSurface =
-    0.05f;  // neighbours that differ by less, as a share, lie on one surface
+constexpr float kOneSurface = 0.05f;  // neighbours that differ by less, as a share, lie on one
+                                      // surface
 constexpr std::size_t kViewsForScale = 20;  // views whose depths are read to find the scale
 constexpr std::size_t kLeastPoints = 20;
-constexpr double kOfTheSameScene =
-    0.2;  // largest spread of the ratios of points to depths, as a share
+constexpr double kOfTheSameScene = 0.2;  // largest spread of the ratios of points to depths, as a
+                                         // share
 
 /// The stems of a name: with and without its extension, with and without images/.
 std::vector<fs::path> depth_stems(const std::string& name) {
@@ -127,7 +127,7 @@ void check_depths(const fs::path& depths, const fs::path& images, const Dataset&
     }
 }
 
-/// Turns a depth image as its photo is turned, by the EXIF rotation of an image with as many bytes.
+/// Turns a depth image as its photo is turned, passing its floats as RGBA pixels.
 ImageF turned(ImageF depth, const View& view) {
     ImageU8 bytes(depth.width, depth.height, 4);
     std::memcpy(bytes.data.data(), depth.data.data(), bytes.data.size());

@@ -25,10 +25,10 @@ constexpr int kMost = 100'000;
 // Where the axes of cameras are parallel, this weight pulls the point that they look at to their
 // mean.
 constexpr double kPull = 1e-3;
-constexpr double kLeastUp =
-    1e-3;  // length of the mean of the cameras' up vectors: below this, they have none in common
-constexpr double kOnePlace =
-    1e-9;  // share of the distance to the origin (at least 1): closer cameras stand in one place
+constexpr double kLeastUp = 1e-3;   // length of the mean of the cameras' up vectors: below this,
+                                    // they have none in common
+constexpr double kOnePlace = 1e-9;  // share of the distance to the origin (at least 1): closer
+                                    // cameras stand in one place
 constexpr double kTurn = 6.283185307179586;
 
 glm::dvec3 row(const glm::dmat3& m, int r) {
@@ -56,8 +56,8 @@ glm::dvec3 looked_at(const std::vector<View>& views, const glm::dvec3& mean) {
 
 struct Ring {  // the frame in which angles are measured
     glm::dvec3 centre, right, ahead;
-    bool one_place =
-        false;  // the cameras stand in one place, and their viewing directions tell them apart
+    bool one_place = false;  // the cameras stand in one place, and their viewing directions tell
+                             // them apart
     double angle(const Camera& camera) const {
         const glm::dvec3 at = one_place ? row(camera.rotation, 2) : camera.centre() - centre;
         return std::atan2(glm::dot(at, ahead), glm::dot(at, right));

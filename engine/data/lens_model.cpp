@@ -321,8 +321,8 @@ namespace {
 
 constexpr double kMaxTangent = 1.7320508075688772;  // 60 degrees to each side
 constexpr int kBorderSamples = 128;                 // per side
-constexpr double kMaxGrowth =
-    2.0;  // limit on the size, as a multiple, against extreme magnification
+constexpr double kMaxGrowth = 2.0;  // limit on the size, as a multiple, against extreme
+                                    // magnification
 
 /// Bounds of the frame on the plane z = 1.
 struct Bounds {

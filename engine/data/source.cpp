@@ -391,8 +391,8 @@ constexpr double kLeastCore = 2.0 / 3;  // share of the cameras that stand toget
 constexpr double kShareOfDepth = 0.1;  // share of the distance to the points: cameras that stand in
                                        // one place are treated as at least this far apart
 constexpr double kLeastSpread = 0.05;  // share of the frame that the points must cover
-constexpr std::size_t kLeastGroup =
-    3;  // as many cameras elsewhere are a second place, not mistakes
+constexpr std::size_t kLeastGroup = 3;    // as many cameras elsewhere are a second place, not
+                                          // mistakes
 constexpr std::size_t kNamedCameras = 3;  // photos named in a note
 
 /// A number of views, and the first of them.

@@ -29,8 +29,8 @@ Tensors parse_safetensors(std::span<const std::byte> file, const std::string& wh
 enum class LpipsNet { alexnet, vgg16 };
 
 struct LpipsOptions {
-    /// LPIPS and its paper map colours from [0, 1] to [-1, 1] first. The evaluation code of 3DGS
-    /// does not, and numbers published in splat papers are without it.
+    /// The lpips package and its paper map colours from [0, 1] to [-1, 1] first. The evaluation
+    /// code of 3DGS does not, and numbers published in splat papers are without it.
     bool as_3dgs = false;
     int threads = 0;  // 0: one per core
 };
