@@ -1,8 +1,8 @@
 #include "engine/check/dump.h"
 
+#include <fmt/format.h>
 #include <bit>
 #include <cstring>
-#include <fmt/format.h>
 #include <numeric>
 
 #include "engine/check/device_walk.h"

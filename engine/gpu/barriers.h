@@ -4,10 +4,10 @@
 // only. Private to engine/gpu.
 #pragma once
 
+#include <vulkan/vulkan.h>
 #include <optional>
 #include <unordered_map>
 #include <vector>
-#include <vulkan/vulkan.h>
 
 namespace darb {
 

@@ -1,7 +1,7 @@
 #include "engine/gpu/commands.h"
 
-#include <algorithm>
 #include <fmt/format.h>
+#include <algorithm>
 #include <utility>
 
 #include "engine/core/error.h"

@@ -2,6 +2,7 @@
 // writes, and runs them. Each pass() is a debug label and a pair of timestamps.
 #pragma once
 
+#include <vulkan/vulkan.h>
 #include <array>
 #include <cstdint>
 #include <initializer_list>
@@ -10,7 +11,6 @@
 #include <string>
 #include <string_view>
 #include <vector>
-#include <vulkan/vulkan.h>
 
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/device.h"

@@ -1,8 +1,8 @@
 #include "engine/gpu/device.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <charconv>
-#include <fmt/format.h>
 #include <numeric>
 #include <optional>
 #include <string_view>

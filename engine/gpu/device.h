@@ -3,12 +3,12 @@
 // faults, tuning) is read by commands and tests and handed down in options.
 #pragma once
 
+#include <vulkan/vulkan.h>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
-#include <vulkan/vulkan.h>
 
 #include "engine/gpu/faults.h"
 #include "engine/gpu/pipeline_statistics.h"

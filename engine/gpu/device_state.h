@@ -1,6 +1,7 @@
 // What Buffer, Pipeline and Commands share of a Device. Private to engine/gpu.
 #pragma once
 
+#include <vulkan/vulkan.h>
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -9,7 +10,6 @@
 #include <span>
 #include <string>
 #include <vector>
-#include <vulkan/vulkan.h>
 
 #include "engine/gpu/device.h"
 #include "engine/gpu/faults.h"

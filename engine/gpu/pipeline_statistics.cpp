@@ -1,10 +1,10 @@
 #include "engine/gpu/pipeline_statistics.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cstring>
-#include <fmt/format.h>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"

@@ -1,9 +1,9 @@
 #include "engine/plan/effect_plan.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <fmt/format.h>
 #include <iterator>
 #include <thread>
 #include <vector>

@@ -1,8 +1,8 @@
 #include "engine/raster/adam.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 
 #include "engine/core/error.h"
 #include "engine/primitives/groups.h"

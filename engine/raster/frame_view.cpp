@@ -1,7 +1,7 @@
 #include "engine/raster/frame_view.h"
 
-#include <cmath>
 #include <fmt/format.h>
+#include <cmath>
 
 #include "engine/core/error.h"
 #include "shaders/shared/lens.h"

@@ -1,7 +1,7 @@
 #include "engine/raster/kernel_constants.h"
 
-#include <cmath>
 #include <fmt/format.h>
+#include <cmath>
 #include <string>
 #include <utility>
 

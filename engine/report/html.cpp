@@ -1,9 +1,9 @@
 #include "engine/report/html.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <fmt/format.h>
 
 namespace darb {
 

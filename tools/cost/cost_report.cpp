@@ -1,7 +1,7 @@
 #include "tools/cost/cost_report.h"
 
-#include <algorithm>
 #include <fmt/format.h>
+#include <algorithm>
 
 #include "engine/report/html.h"
 #include "engine/report/svg_plot.h"

@@ -1,8 +1,8 @@
 #include "tools/paper/compare_stats.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <utility>
 
 #include "engine/core/quantile.h"

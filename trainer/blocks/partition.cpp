@@ -1,9 +1,9 @@
 #include "trainer/blocks/partition.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 
 #include "engine/core/error.h"

@@ -1,9 +1,9 @@
 #include "trainer/blocks/run_blocks.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fmt/format.h>
 #include <numeric>
 #include <optional>
 

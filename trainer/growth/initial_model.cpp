@@ -1,11 +1,11 @@
 #include "trainer/growth/initial_model.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <fmt/format.h>
 #include <glm/glm.hpp>
 #include <numeric>
 #include <set>

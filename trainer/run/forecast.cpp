@@ -1,13 +1,13 @@
 #include "trainer/run/forecast.h"
 
+#include <fmt/format.h>
+#include <sys/resource.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fmt/format.h>
 #include <fstream>
 #include <limits>
 #include <string>
-#include <sys/resource.h>
 
 #include "engine/core/error.h"
 #include "engine/core/memory.h"

@@ -1,9 +1,9 @@
 #include "trainer/step/batch_step.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <fmt/format.h>
 
 #include "engine/core/error.h"
 #include "engine/raster/attribute_rows.h"

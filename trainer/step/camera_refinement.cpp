@@ -1,8 +1,8 @@
 #include "trainer/step/camera_refinement.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <map>
 #include <tuple>
 

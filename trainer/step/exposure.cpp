@@ -1,8 +1,8 @@
 #include "trainer/step/exposure.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <glm/glm.hpp>
 
 #include "engine/core/error.h"

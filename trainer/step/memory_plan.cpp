@@ -215,8 +215,8 @@ bool photos_stream(const Device& device, const Dataset& dataset, const TrainOpti
         all.small_pixels = all.small_cameras = 0;
     } else {
         const Schedule schedule(options);
-        all.splats =
-            std::max(start_splats, wanted_splats(device, dataset, options, photos.photo_pixels, start_splats));
+        all.splats = std::max(start_splats, wanted_splats(device, dataset, options,
+                                                          photos.photo_pixels, start_splats));
         all.densifies = has_rounds(schedule);
         all.averages = schedule.averages();
     }

@@ -1,8 +1,8 @@
 #include "trainer/step/photos.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <span>
 #include <utility>
 
