@@ -322,7 +322,7 @@ TEST(ColmapProject, remedies_that_errors_name_work_as_typed) {
     write_png(folder / "masks/first.png", ImageU8(8, 6, 1));
     std::string error = error_of([&] { load_dataset(folder); });
     std::filesystem::rename(folder / "masks/first.png",
-                            folder / "masks" / after(error, "photos, as "));
+                            folder / "masks" / after(error, "photos, such as "));
     EXPECT_EQ(load_dataset(folder).views.at(0).mask, folder / "masks/a.png");
 
     ImageF depth(8, 6, 1);

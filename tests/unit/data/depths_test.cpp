@@ -123,7 +123,7 @@ TEST(DepthFiles, tiff_that_is_damaged_or_of_another_kind_is_refused) {
         jpeg{{259, 7}}, huge{{256, 60'000}, {257, 60'000}}, no_rows{{278, 0}}, odd{{317, 9}};
     for (const auto& [fields, part] : {std::pair{three, "3 channels"},
                                        {eight, "8 bits"},
-                                       {jpeg, "method 7"},
+                                       {jpeg, "compression 7"},
                                        {huge, "60000"},
                                        {no_rows, "no size"},
                                        {odd, "predictor 9"}}) {
