@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "engine/core/text.h"
 
@@ -19,6 +20,12 @@ void say_text(std::string_view text) noexcept;
 /// Formatted, and printable(): names of files may hold what steers a terminal.
 template <typename... T>
 void say(fmt::format_string<T...> format, T&&... values);
+
+/// A line on stderr that is neither warning nor error: nothing after leave_out_notes(true).
+void say_note(std::string_view line);
+/// "note: ..." lines, as readers give them.
+void say_notes(const std::vector<std::string>& notes);
+void leave_out_notes(bool quiet);
 
 /// Writes to stdout and flushes. Where nobody reads any more (a pipe that was closed, a terminal
 /// that is gone), stdout becomes /dev/null; false, with errno, where it fails otherwise (a full

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -13,6 +14,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
+#include "engine/core/say.h"
 #include "engine/core/scope_guard.h"
 #include "engine/gpu/shader_table.h"
 #include "engine/kernels/shaped_kernel.h"
@@ -320,6 +322,11 @@ void tune(Device& device, const TuneRequest& request) {
     }
     if (record) names.merge(TuningNames(record->choice));
     device.set_tuning(with_names(usual_tuning(info), names));
+}
+
+void settle_tuning(Device& device, const std::string& forced, bool retune) {
+    const char* environment = std::getenv("DARB_TUNE");
+    tune(device, {forced, environment != nullptr ? environment : "", retune, say_note});
 }
 
 }  // namespace darb

@@ -1,7 +1,7 @@
 // The device of tests: that of the command, so both compile a shader once.
 #pragma once
 
-#include "tools/darb/device_options.h"
+#include "engine/gpu/device_environment.h"
 
 namespace darb::test {
 
