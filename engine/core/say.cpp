@@ -11,6 +11,8 @@ namespace darb {
 
 namespace {
 
+bool notes_left_out = false;
+
 // Whether the error means that the reader has gone away, rather than that a disk failed.
 bool nobody_reads(int error) {
     struct stat facts {};
@@ -23,6 +25,18 @@ bool nobody_reads(int error) {
 void say_text(std::string_view text) noexcept {
     if (std::fwrite(text.data(), 1, text.size(), stderr) != text.size() || std::fflush(stderr) != 0)
         std::clearerr(stderr);
+}
+
+void say_note(std::string_view line) {
+    if (!notes_left_out) say("{}\n", line);
+}
+
+void say_notes(const std::vector<std::string>& notes) {
+    for (const std::string& note : notes) say_note("note: " + note);
+}
+
+void leave_out_notes(bool quiet) {
+    notes_left_out = quiet;
 }
 
 bool write_or_let_go(std::string_view text) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "engine/core/text.h"
 
@@ -20,6 +21,12 @@ void say_text(std::string_view text) noexcept;
 /// Formats the text and makes it printable(), because file names may contain control characters.
 template <typename... T>
 void say(fmt::format_string<T...> format, T&&... values);
+
+/// A line on stderr that is neither warning nor error: nothing after leave_out_notes(true).
+void say_note(std::string_view line);
+/// "note: ..." lines, as readers give them.
+void say_notes(const std::vector<std::string>& notes);
+void leave_out_notes(bool quiet);
 
 /// Writes to stdout and flushes. Where the reader has gone away (a closed pipe or terminal), stdout
 /// becomes /dev/null. Returns false, with errno set, where writing fails for another reason (a full

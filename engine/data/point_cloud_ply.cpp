@@ -29,6 +29,45 @@ std::uint8_t colour_byte(double value) {
                                                           : kMidGrey);
 }
 
+// Which columns of element vertex a cloud takes, and what their values mean.
+struct CloudColumns {
+    int position[3] = {}, colour[3] = {}, dc[3] = {};  // -1: there is none
+    bool is_scene = false;                             // of splats, whose f_dc is the colour
+    bool uncoloured = false;
+    bool floats[3] = {};           // colours of 0 to 1 or 0 to 255: the largest of all says which
+    double factor[3] = {1, 1, 1};  // what else a value is multiplied by, to 0 .. 255
+    bool any_floats() const { return floats[0] || floats[1] || floats[2]; }
+
+    /// Of a row, 0 to 255, but for floats of 0 to 1.
+    double colour_of(const double* values, int channel) const {
+        if (is_scene) return 255 * colour_of_dc(values[dc[channel]]);
+        return colour[channel] < 0 ? kMidGrey : values[colour[channel]] * factor[channel];
+    }
+};
+
+CloudColumns find_columns(const PlyElement& vertex, const std::string& where) {
+    CloudColumns c;
+    for (int i = 0; i < 3; ++i) {
+        c.position[i] = vertex.find(std::string(1, "xyz"[i]));
+        if (c.position[i] < 0)
+            throw Error(where, fmt::format("element vertex lacks the property {}", "xyz"[i]),
+                        "A point cloud is needed.");
+        constexpr const char* kNames[3][3] = {{"red", "r", "diffuse_red"},
+                                              {"green", "g", "diffuse_green"},
+                                              {"blue", "b", "diffuse_blue"}};
+        c.colour[i] = std::max(
+            {vertex.find(kNames[i][0]), vertex.find(kNames[i][1]), vertex.find(kNames[i][2])});
+        c.dc[i] = vertex.find(fmt::format("f_dc_{}", i));
+        if (c.colour[i] < 0) continue;
+        const PlyType type = vertex.properties[static_cast<std::size_t>(c.colour[i])].type;
+        c.floats[i] = is_float(type);
+        if (type == PlyType::uint16) c.factor[i] = 1.0 / 257;
+    }
+    c.uncoloured = c.colour[0] < 0 && c.colour[1] < 0 && c.colour[2] < 0;
+    c.is_scene = c.uncoloured && c.dc[0] >= 0 && c.dc[1] >= 0 && c.dc[2] >= 0;
+    return c;
+}
+
 }  // namespace
 
 PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const std::string& where,
@@ -41,38 +80,14 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeade
                                  std::vector<std::string>* notes) {
     const PlyElement* vertex = header.find("vertex");
     if (!vertex) throw Error(where, "has no element vertex", "A point cloud is needed.");
-    int position[3], colour[3], dc[3];
-    for (int i = 0; i < 3; ++i) {
-        position[i] = vertex->find(std::string(1, "xyz"[i]));
-        if (position[i] < 0)
-            throw Error(where, fmt::format("element vertex lacks the property {}", "xyz"[i]),
-                        "A point cloud is needed.");
-        constexpr const char* kNames[3][3] = {{"red", "r", "diffuse_red"},
-                                              {"green", "g", "diffuse_green"},
-                                              {"blue", "b", "diffuse_blue"}};
-        colour[i] = std::max(
-            {vertex->find(kNames[i][0]), vertex->find(kNames[i][1]), vertex->find(kNames[i][2])});
-        dc[i] = vertex->find(fmt::format("f_dc_{}", i));
-    }
-    const bool uncoloured = colour[0] < 0 && colour[1] < 0 && colour[2] < 0;
-    const bool is_scene = uncoloured && dc[0] >= 0 && dc[1] >= 0 && dc[2] >= 0;
-    if (notes && is_scene)
+    const CloudColumns columns = find_columns(*vertex, where);
+    if (notes && columns.is_scene)
         notes->push_back(
             fmt::format("{} is a splat scene: its points have the colours of its f_dc.", where));
-    if (notes && uncoloured && !is_scene && vertex->count > 0)
+    if (notes && columns.uncoloured && !columns.is_scene && vertex->count > 0)
         notes->push_back(fmt::format("{} has no colours: its points are grey.", where));
-    // What each value is multiplied by to be in [0, 255]; for floats, set once the largest is
-    // known.
-    const auto type_of = [&](int i) {
-        return vertex->properties[static_cast<std::size_t>(colour[i])].type;
-    };
-    bool floats = false;
-    double factor[3] = {1, 1, 1}, largest = 0;
-    for (int i = 0; i < 3; ++i) {
-        if (colour[i] < 0) continue;
-        floats |= is_float(type_of(i));
-        if (type_of(i) == PlyType::uint16) factor[i] = 1.0 / 257;
-    }
+    const bool floats = columns.any_floats();
+    double largest = 0;
     std::vector<float> raw;  // [P][3], where some colour is a float
     check_ply_size(file, header, *vertex, where);
     PointCloud points;
@@ -80,26 +95,23 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeade
     points.colour.reserve(vertex->count * 3);
     dropped = 0;
     read_ply_rows(file, header, *vertex, where, [&](std::size_t, const double* values) {
-        if (!std::isfinite(values[position[0]] + values[position[1]] + values[position[2]])) {
+        const int* const at = columns.position;
+        if (!std::isfinite(values[at[0]] + values[at[1]] + values[at[2]])) {
             ++dropped;
             return;
         }
         for (int i = 0; i < 3; ++i) {
-            points.position.push_back(values[position[i]]);
-            const double value = is_scene        ? 255 * colour_of_dc(values[dc[i]])
-                                 : colour[i] < 0 ? kMidGrey
-                                                 : values[colour[i]] * factor[i];
+            const double value = columns.colour_of(values, i);
+            points.position.push_back(values[at[i]]);
             points.colour.push_back(colour_byte(value));
             if (!floats) continue;
             raw.push_back(static_cast<float>(value));
-            if (colour[i] >= 0 && is_float(type_of(i)) && std::isfinite(value))
-                largest = std::max(largest, value);
+            if (columns.floats[i] && std::isfinite(value)) largest = std::max(largest, value);
         }
     });
     if (floats && largest <= kLargestUnitColour)
         for (std::size_t i = 0; i < raw.size(); ++i)
-            if (const int c = static_cast<int>(i % 3); colour[c] >= 0 && is_float(type_of(c)))
-                points.colour[i] = colour_byte(255.0 * raw[i]);
+            if (columns.floats[i % 3]) points.colour[i] = colour_byte(255.0 * raw[i]);
     return points;
 }
 

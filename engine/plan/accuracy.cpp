@@ -82,6 +82,21 @@ std::optional<int> preset_from_name(std::string_view name) {
     return static_cast<int>(found - std::begin(kPresets));
 }
 
+int preset_of_option(std::string_view name) {
+    const auto preset = preset_from_name(name);
+    if (!preset)
+        throw Error(fmt::format("--accuracy {}", name), "no such preset",
+                    "Use fast, balanced or exact.");
+    return *preset;
+}
+
+std::string accuracy_help(const AccuracySetting& setting) {
+    std::string names;
+    for (const AccuracyChoice& choice : setting.choices)
+        names += fmt::format("{}{}", names.empty() ? "" : ", ", choice.name);
+    return fmt::format("{} [{}]", setting.what, names);
+}
+
 std::string accuracy_flag(const AccuracySetting& setting) {
     std::string flag = "--" + std::string(setting.name);
     std::replace(flag.begin(), flag.end(), '_', '-');

@@ -45,7 +45,10 @@ struct AccuracySetting {
 std::span<const AccuracySetting> accuracy_settings();
 std::string_view preset_name(int preset);  // fast, balanced, exact
 std::optional<int> preset_from_name(std::string_view name);
+/// As after --accuracy. Throws Error where there is none of that name.
+int preset_of_option(std::string_view name);
 std::string accuracy_flag(const AccuracySetting& setting);  // "--alpha-cutoff"
+std::string accuracy_help(const AccuracySetting& setting);  // with the names of its choices
 
 /// One choice a setting; all defaults at first.
 struct Accuracy {

@@ -86,6 +86,23 @@ bool words_refuse_effect(std::string_view text, std::string_view effect) {
     return !effect_in_words(text, effect).value_or(choice.base != EffectChoice::Base::none);
 }
 
+EffectChoice choose_effects(const std::string& text, EffectUse use, DatasetOptions& data) {
+    const EffectChoice choice = parse_effects(text);
+    for (const int effect : impossible_effects(use))
+        if (choice.changed[static_cast<std::size_t>(effect)].value_or(false))
+            throw Error(
+                "--effects " + text,
+                fmt::format("'{}' is nothing that this command can do", effect_name(effect)),
+                fmt::format("Leave +{} out.", effect_name(effect)));
+    if (choice.changed[EFFECT_LENS].value_or(choice.base != EffectChoice::Base::none))
+        return choice;
+    if (data.original_lens)
+        throw Error("--effects " + text, "drops the lens that --lens original keeps",
+                    "Leave --lens out, or keep the effect with +lens.");
+    data.original_where_wide = false;
+    return choice;
+}
+
 ProjectionEffects EffectPlan::projection() const {
     ProjectionEffects effects;
     for (const ProjectionSwitch& s : kProjectionSwitches)

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -14,6 +15,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
+#include "engine/core/say.h"
 #include "engine/core/scope_guard.h"
 #include "engine/gpu/shader_table.h"
 #include "engine/kernels/shaped_kernel.h"
@@ -475,6 +477,11 @@ FormChoice choose_form(const TimedForms& forms, std::size_t count, const TimingE
         if (best_form(time_rounds(forms, both, effort)) == 0) choice.form = 0;
     }
     return choice;
+}
+
+void settle_tuning(Device& device, const std::string& forced, bool retune) {
+    const char* environment = std::getenv("DARB_TUNE");
+    tune(device, {forced, environment != nullptr ? environment : "", retune, say_note});
 }
 
 }  // namespace darb

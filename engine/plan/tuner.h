@@ -113,6 +113,10 @@ struct TuneRequest {
 /// Without a record a device that is not known is measured. Throws Error for unknown names.
 void tune(Device& device, const TuneRequest& request);
 
+/// The same with the environment's DARB_TUNE, and its lines on stderr. Before anything is made for
+/// the device.
+void settle_tuning(Device& device, const std::string& forced = {}, bool retune = false);
+
 /// The choice in a line, with the milliseconds of all.
 std::string tuning_text(const TuningRecord& record);
 

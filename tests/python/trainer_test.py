@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """darb.Trainer: the bits of `darb train`, a loss of one's own, checkpoints; studies and plans."""
 
+import json
 import os
 import pathlib
 import signal
@@ -21,6 +22,27 @@ except ModuleNotFoundError as error:  # one that is there and does not load fail
 SCENE = support.SHIPPED
 OPTIONS = {"resolution": 32, "iterations": 24, "sh_degree": 1, "densify_from_iter": 5,
            "densification_interval": 5, "max_splats": 3000, "effects": "+exposure", "seed": 3}
+
+
+# Of every option that a Trainer takes, but start_checkpoint, a value that is not its default.
+OTHER = {
+    "schedule": "3dgs", "preset": "preview", "resolution": 40, "eval": True,
+    "hold_out": "every:5,arc:3", "images": "./images", "lens": "undistort", "depth_scale": 2.5,
+    "kernel": "raised_cosine", "strategy": "mcmc", "start": "random", "effects": "-lens",
+    "antialiasing": True, "refine_cameras": "on", "evaluation": "polynomial4",
+    "footprint": "exact", "alpha_cutoff": "1/1024", "transmittance_stop": "1e-6",
+    "storage": "float16", "depth_order": "centre16", "iterations": 6, "batch": 2, "seed": 7,
+    "max_splats": 900, "max_memory": "1.5GB", "sh_degree": 1, "depth_weight": 0.25,
+    "camera_lr": 0.5, "camera_from": 0.25, "camera_anchor": 0.5, "exposure_grid": True,
+    "exposure_lr_init": 0.002, "exposure_lr_final": 0.0005, "white_background": True,
+    "random_background": False, "resolution_ramp": "off", "lambda_dssim": 0.25,
+    "position_lr_init": 0.0003, "position_lr_final": 0.00001, "scaling_lr": 0.004,
+    "rotation_lr": 0.002, "opacity_lr": 0.04, "shape_lr": 0.003, "feature_lr": 0.003,
+    "sh_rest_every": 2, "average_from": 0.5, "densify_from_iter": 1, "densify_until_iter": 5,
+    "densification_interval": 2, "densify_grad_threshold": 0.0003, "percent_dense": 0.02,
+    "prune_opacity": 0.01, "opacity_reset_interval": 4, "noise_lr": 1000.0,
+    "morton_order": True, "opacity_reg": 0.02, "scale_reg": 0.03, "largest_scale": 0.5,
+    "clearance": 0.25, "random_points": 700}
 
 
 def words(options):
@@ -144,6 +166,40 @@ class Training(unittest.TestCase):
         trainer.step(1, loss=lambda image, view: np.zeros_like(image))
         self.assertEqual(trainer.iteration, 4)
 
+    @unittest.skipUnless(os.path.exists(support.COMMAND), "the command is not built")
+    def test_every_option_comes_to_what_the_command_makes_of_it(self):
+        usual = darb.Trainer(SCENE, resolution=32).options
+        self.assertEqual(set(OTHER) | {"render_scale", "start_checkpoint"}, set(usual))
+        switches = {"random_background": "--fixed-background"}
+        for strategy, left_out in (("adc", {"noise_lr"}),
+                                   ("mcmc", {"schedule", "densify_grad_threshold", "percent_dense",
+                                             "opacity_reset_interval"})):
+            options = {**OTHER, "strategy": strategy}
+            options = {name: v for name, v in options.items() if name not in left_out}
+            given = words({n: v for n, v in options.items() if not isinstance(v, bool)})
+            given += [switches.get(n, "--" + n.replace("_", "-")) for n, v in options.items()
+                      if isinstance(v, bool)]
+            out = self.path / strategy
+            subprocess.run([support.COMMAND, "train", str(SCENE), "-o", str(out), "-q",
+                            "--no-report", *given], check=True, capture_output=True)
+            request = json.loads((out / "request.json").read_text())
+            saved = {n.replace("-", "_"): v for part in ("data", "train", "accuracy", None)
+                     for n, v in (request[part] if part else request).items()
+                     if not isinstance(v, dict)}
+            asked = darb.Trainer(SCENE, **options).options
+            for name, value in asked.items():
+                with self.subTest(name, strategy=strategy):
+                    self.assertEqual(value, saved[name])
+            changed = {name for name in options if asked[name] != usual[name]}
+            self.assertEqual(set(options) - changed,
+                             {"strategy"} if strategy == "adc" else set())
+
+    def test_a_switch_is_turned_off_by_false_and_an_option_left_out_by_none(self):
+        options = self.trained(eval=False, random_background=False, kernel=None).options
+        self.assertIs(options["eval"], False)
+        self.assertIs(options["random_background"], False)
+        self.assertEqual(options["kernel"], "gaussian")
+
     def test_a_kernel_of_ones_own_trains(self):
         cubic = darb.Kernel(lambda q: (1 - q / 9) ** 3, support=9, name="trained_cubic")
         trainer = self.trained(kernel=cubic)
@@ -165,8 +221,12 @@ class Training(unittest.TestCase):
     def test_mistakes_are_errors_of_the_command(self):
         for text, options in (("--kernel foo: no such kernel", {"kernel": "foo"}),
                               ("--iterations", {"iterations": -5}),
-                              ("not expected: --no-such", {"no_such": 1}),
+                              ("--no-such: is no option of training", {"no_such": 1}),
                               ("output: is an option of the command alone", {"output": "x"}),
+                              ("model_path: is an option of the command", {"model_path": "x"}),
+                              ("view: is an option of the command alone", {"view": True}),
+                              ("kernel: is of the type bool", {"kernel": True}),
+                              ("--seed: has an empty value", {"seed": ""}),
                               ("strategy", {"strategy": "none"}),
                               ("noise.lr.*means nothing", {"noise_lr": 3.0}),
                               ("iterations: is of the type numpy.ndarray, no whole number",

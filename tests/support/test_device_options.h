@@ -1,7 +1,7 @@
 // Options for the device of tests: those of the command, so that both compile a shader only once.
 #pragma once
 
-#include "tools/darb/device_options.h"
+#include "engine/gpu/device_environment.h"
 
 namespace darb::test {
 

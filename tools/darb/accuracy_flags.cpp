@@ -2,44 +2,30 @@
 
 #include <fmt/format.h>
 
-#include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "engine/kernels/kernel_family.h"
-#include "tools/darb/outputs.h"
+#include "trainer/job/request_options.h"
 
 namespace darb {
 
-void add_accuracy_flags(CLI::App& command, AccuracyFlags& flags, bool training) {
-    const char* group = "Accuracy";
-    command
-        .add_option("--accuracy", flags.preset,
-                    "fast, balanced (default) or exact; `darb cost` shows what each costs")
-        ->group(group);
+void add_accuracy_flags(CLI::App& command, AccuracyFlags& flags) {
+    command.add_option("--accuracy", flags.preset, request_option("--accuracy").row.help)
+        ->group(option_group::kAccuracy);
     for (int s = 0; s < kAccuracyCount; ++s) {
-        if (training && s == kShDegree) continue;
         const AccuracySetting& setting = accuracy_settings()[static_cast<size_t>(s)];
-        std::string names;
-        for (const AccuracyChoice& choice : setting.choices)
-            names += fmt::format("{}{}", names.empty() ? "" : ", ", choice.name);
         command
             .add_option(accuracy_flag(setting), flags.choice[static_cast<size_t>(s)],
-                        fmt::format("{} [{}]", setting.what, names))
-            ->group(group);
+                        accuracy_help(setting))
+            ->group(option_group::kAccuracy);
     }
 }
 
-Accuracy chosen_accuracy(const AccuracyFlags& flags, bool training) {
-    int preset = kBalanced;
-    if (!flags.preset.empty()) {
-        const auto found = preset_from_name(flags.preset);
-        if (!found)
-            throw Error("--accuracy " + flags.preset, "no such preset",
-                        "Use fast, balanced or exact.");
-        preset = *found;
-    }
-    Accuracy accuracy = preset_accuracy(preset, training);
+Accuracy chosen_accuracy(const AccuracyFlags& flags) {
+    Accuracy accuracy =
+        preset_accuracy(flags.preset.empty() ? int{kBalanced} : preset_of_option(flags.preset));
     for (int s = 0; s < kAccuracyCount; ++s) {
         const std::string& name = flags.choice[static_cast<size_t>(s)];
-        if (!name.empty()) accuracy.choice[s] = find_choice(s, name, training);
+        if (!name.empty()) accuracy.choice[s] = find_choice(s, name);
     }
     return accuracy;
 }

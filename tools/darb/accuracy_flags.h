@@ -14,12 +14,11 @@ struct AccuracyFlags {
     std::array<std::string, kAccuracyCount> choice;  // empty: the preset's
 };
 
-/// training: leaves --sh-degree out, which `darb train` has of its own.
-void add_accuracy_flags(CLI::App& command, AccuracyFlags& flags, bool training = false);
+/// Of pictures; of training they are rows of trainer/job/request_options.h.
+void add_accuracy_flags(CLI::App& command, AccuracyFlags& flags);
 
-/// The preset with what single flags change. Throws Error on names that do not exist and, in
-/// training, on choices for pictures only.
-Accuracy chosen_accuracy(const AccuracyFlags& flags, bool training = false);
+/// The preset with what single flags change. Throws Error on names that do not exist.
+Accuracy chosen_accuracy(const AccuracyFlags& flags);
 
 /// A note where a choice that was given changes nothing of this kernel.
 void note_unused_choices(const AccuracyFlags& flags, int kernel);

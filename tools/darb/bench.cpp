@@ -10,19 +10,20 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/gpu/device_environment.h"
+#include "engine/plan/effect_plan.h"
 #include "tools/bench/bench_report.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
 #include "tools/darb/bench_choice.h"
 #include "tools/darb/bench_growth.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"
-#include "tools/darb/effect_flags.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/numbers.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
+#include "trainer/job/job.h"
 
 namespace darb {
 

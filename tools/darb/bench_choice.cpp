@@ -6,7 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "tools/darb/scene_file.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
 

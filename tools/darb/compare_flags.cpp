@@ -11,6 +11,7 @@
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/numbers.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/train_flags.h"
 #include "trainer/options/strategy.h"
 
 namespace darb {
@@ -121,7 +122,7 @@ TrainRequest train_request_of(const CompareFlags& flags, const std::string& data
     if (own_images) words.push_back("--images=" + dataset.substr(path.size() + 1));
     for (const std::string& word : flags.forwarded)
         if (!own_images || !word.starts_with("--images=")) words.push_back(word);
-    return parse_train_flags(std::move(words), flags.train_options, "darb compare").request;
+    return parse_train_words(std::move(words), flags.train_options, "darb compare");
 }
 
 }  // namespace darb

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "engine/ranks/ranks.h"
-#include "tools/darb/train_flags.h"
 #include "tools/paper/compare_runs.h"
 #include "tools/paper/lpips.h"
+#include "trainer/job/request.h"
 
 namespace darb {
 

@@ -7,9 +7,9 @@
 #include "engine/core/error.h"
 #include "engine/core/text.h"
 #include "engine/data/metrics.h"
+#include "engine/gpu/device_environment.h"
 #include "engine/render/renderer.h"
 #include "tools/cost/views.h"
-#include "tools/darb/device_options.h"
 
 namespace darb {
 

@@ -5,15 +5,16 @@
 #include <optional>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "engine/data/camera_list.h"
+#include "engine/gpu/device_environment.h"
+#include "engine/plan/tuner.h"
 #include "tools/darb/compare_flags.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/run_measurer.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/train_plan.h"
-#include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_measure.h"
 #include "tools/paper/compare_share.h"
 #include "trainer/job/job.h"
@@ -33,7 +34,7 @@ class Comparer {
         TrainRequest first = train_request_of(flags, name, kernel, 0);
         std::optional<RunLock> lock;  // while COLMAP writes
         dataset_ = load_training_data(first, lock, {flags.quiet, &stop_on_signals()});
-        print_notes(dataset_.notes);
+        say_notes(dataset_.notes);
         if (held_out().empty())
             throw Error(name, "holds no view out", "Give it more photos, or a list of test views.");
         photos_ = load_photos(dataset_.views);

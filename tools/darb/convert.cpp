@@ -8,21 +8,22 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/gpu/device_environment.h"
 #include "engine/publish/fit_pictures.h"
 #include "engine/scene/gaussian_scene.h"
 #include "engine/scene/splat_file.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/compare_scenes.h"
 #include "tools/darb/convert_levels.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/numbers.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/page_output.h"
 #include "tools/darb/palette_device.h"
 #include "tools/darb/scene_edits.h"
-#include "tools/darb/scene_file.h"
 #include "tools/darb/slow_progress.h"
+#include "tools/darb/unit_flags.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
 
@@ -104,10 +105,20 @@ Device* PictureDevice::get() {
     return device_ ? &*device_ : nullptr;
 }
 
-/// Says what of the scene is lost, chooses, checks and writes. views: of a measure. Throws Error.
-WrittenScene write_scene(const std::filesystem::path& output, SplatFormat format, SplatModel& model,
-                         const std::vector<View>& views, const OutputChoices& choices,
-                         PictureDevice& device, const WrittenFiles& files, const Paths& inputs) {
+/// What every scene that a command writes has in common.
+struct SceneWriter {
+    SplatFormat format;
+    const std::vector<View>& views;  // of a measure
+    PictureDevice& device;
+    const WrittenFiles& files;
+    const Paths& inputs;
+};
+
+/// Says what of the scene is lost, chooses, checks and writes. Throws Error.
+WrittenScene write_scene(const std::filesystem::path& output, SplatModel& model,
+                         const OutputChoices& choices, const SceneWriter& writer) {
+    const SplatFormat format = writer.format;
+    PictureDevice& device = writer.device;
     for (const std::string& loss : losses_of(format, model, output.string()))
         say("warning: {}: {}\n", output.string(), loss);
     drop_unwritable(format, model);
@@ -121,7 +132,7 @@ WrittenScene write_scene(const std::filesystem::path& output, SplatFormat format
     written.levels = precisions_of(format, model);
     std::optional<PictureMeasure> measure;
     if (written.levels > 1 && model.size() > 0 && device.get())
-        measure.emplace(*device.get(), model, views, glm::vec3(0.0f),
+        measure.emplace(*device.get(), model, writer.views, glm::vec3(0.0f),
                         [&](std::size_t count) { pictures.at(count, "pictures"); });
     SceneOutput splats(output, format, std::move(options), measure.has_value());
     written.fit = fit_pictures(model, measure ? &*measure : nullptr,
@@ -129,10 +140,10 @@ WrittenScene write_scene(const std::filesystem::path& output, SplatFormat format
     written.encoded = splats.take();
     written.splats = splats.splats();
     const Paths outputs = outputs_of(output, written.encoded);
-    refuse_to_overwrite_inputs(outputs, inputs, Replaces::all);
-    files.check(outputs);
+    refuse_to_overwrite_inputs(outputs, writer.inputs, Replaces::all);
+    writer.files.check(outputs);
     write_encoded(output, written.encoded);
-    files.wrote(outputs);
+    writer.files.wrote(outputs);
     return written;
 }
 
@@ -297,20 +308,20 @@ int convert_to_scene(SplatModel& model, SplatFormat format, const ConvertFlags& 
                      const Paths& inputs, const WrittenFiles& files, PictureDevice& device,
                      std::FILE* say) {
     const std::vector<View> views = views_for(model, flags);
+    const SceneWriter writer{format, views, device, files, inputs};
     if (flags.levels.asked()) {
         const auto write = [&](const std::filesystem::path& file, SplatModel& level,
                                std::vector<SplatModel> coarser) {
             OutputChoices choices = flags.choices;
             choices.encode.coarser = std::move(coarser);
-            return write_scene(file, format, level, views, choices, device, files, inputs).encoded;
+            return write_scene(file, level, choices, writer).encoded;
         };
         const LevelOutput to{
             flags.output, format, views, flags.choices.device, device.get() != nullptr, say, write};
         tell_paths(flags.quiet, write_levels(flags.levels, model, to));
         return 0;
     }
-    const WrittenScene written =
-        write_scene(flags.output, format, model, views, flags.choices, device, files, inputs);
+    const WrittenScene written = write_scene(flags.output, model, flags.choices, writer);
     const PictureFit& fit = written.fit;
     tell(say, "{}: {}, {} splats{}, {} bytes{}\n", flags.output.string(), format_name(format),
          written.splats, fit.merged_from > 0 ? fmt::format(" merged from {}", fit.merged_from) : "",

@@ -8,17 +8,18 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
+#include "engine/gpu/device_environment.h"
 #include "tools/cost/cost_report.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/cost_flags.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"
 #include "tools/darb/evaluation_flags.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/pixel_size.h"
-#include "tools/darb/scene_file.h"
+#include "tools/darb/unit_flags.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
 
@@ -46,7 +47,7 @@ CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most)
     DatasetOptions options = flags.data;
     hold_out_as_trained(flags.scene, options);
     const Dataset dataset = load_dataset(flags.dataset, options);
-    print_notes(dataset.notes);
+    say_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(dataset.views));
     return dataset_views(dataset, most);
 }

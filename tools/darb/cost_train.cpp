@@ -5,9 +5,9 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
+#include "engine/gpu/device_environment.h"
 #include "tools/cost/train_cost.h"
 #include "tools/darb/cost_flags.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
@@ -30,8 +30,7 @@ int train_cost(Ranks& ranks, const CostFlags& flags) {
         words.push_back(fmt::format("--resolution={}", flags.data.resolution));
     if (flags.data.hold_out) words.push_back("--hold-out=" + hold_out_text(flags.data.held_out));
     if (flags.white_background) words.emplace_back("--white-background");
-    const TrainRequest request =
-        parse_train_flags(words, flags.train_options, "darb cost --train").request;
+    const TrainRequest request = parse_train_words(words, flags.train_options, "darb cost --train");
     if (request.train.accuracy != Accuracy{})
         throw Error("--train-options " + flags.train_options,
                     "sets the accuracy, which each row of the measurement sets itself",
@@ -41,7 +40,7 @@ int train_cost(Ranks& ranks, const CostFlags& flags) {
     plan.seeds = flags.quick ? 1 : flags.full ? 5 : 3;
     if (flags.seeds > 0) plan.seeds = flags.seeds;
     Dataset dataset = load_dataset(request.dataset, request.data);
-    print_notes(dataset.notes);
+    say_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json, flags.html},
                                together({files_of(flags.train), files_of(dataset.views)}));
     DeviceOptions device_options = command_device(flags.device);

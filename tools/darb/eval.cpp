@@ -9,9 +9,10 @@
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/data/dataset.h"
+#include "engine/gpu/device_environment.h"
+#include "engine/plan/effect_plan.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/eval_light.h"
 #include "tools/darb/evaluation_flags.h"
@@ -19,9 +20,10 @@
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_evaluation.h"
-#include "tools/darb/scene_file.h"
 #include "tools/darb/trained_cameras.h"
 #include "tools/darb/tune_flags.h"
+#include "tools/darb/unit_flags.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
 
@@ -66,12 +68,12 @@ int eval(Ranks& ranks, EvalFlags flags) {
     take_trained_cameras(flags.scene, dataset.views);
     options.alpha_is_mask = dataset.alpha_is_mask;
     options.depth_scale = dataset.depth_scale;
-    print_notes(dataset.notes);
+    say_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(dataset.views));
     const std::vector<View> views = views_of(dataset, flags);
     const Dataset away =
         flags.split == "train" ? Dataset{} : off_path_of(flags.dataset, flags.data);
-    print_notes(away.notes);
+    say_notes(away.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(away.views));
     const std::vector<View> beyond = held_out_views(away.views);
     std::vector<std::vector<View>> sizes;  // before the first picture: a photo may be too small

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "trainer/job/request_options.h"
+
 namespace darb {
 
 Dataset off_path_of(const std::filesystem::path& dataset, const DatasetOptions& options) {
@@ -21,16 +23,15 @@ CLI::Option* add_hold_out_flag(CLI::App& command, DatasetOptions& data) {
                 data.held_out = parse_hold_out(text);
                 data.hold_out = true;
             },
-            "which: every:N, arc:N of the way around, or both")
-        ->default_str("every:8");
+            request_option("--hold-out").row.help)
+        ->default_str(request_option("--hold-out").row.usual);
 }
 
 CLI::Option* add_depth_scale_flag(CLI::App& command, DatasetOptions& data) {
-    return command
-        .add_option("--depth-scale", data.depth_scale,
-                    "world units a metre of depths/ and depth/ beside the photos [by the points "
-                    "that photos saw, else 1]")
-        ->check(CLI::Range(1e-9, 1e9));
+    const OptionRow& row = request_option("--depth-scale").row;
+    return command.add_option(row.flags, data.depth_scale, row.help)
+        ->default_str(row.usual)
+        ->check(CLI::Range(row.least, row.most));
 }
 
 CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales) {

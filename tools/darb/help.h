@@ -7,14 +7,11 @@
 #include <vector>
 
 #include "engine/core/error.h"
+#include "trainer/options/option_table.h"
 
 namespace darb {
 
-/// Headings that --help leaves to --help-all; trainer/options/option_table.h has more of them.
-namespace help_group {
-inline constexpr const char *kInput = "Photos and output", *kSaving = "Saving and testing",
-                            *kAccuracy = "Accuracy", *kDevice = "Device and passes";
-}
+namespace help_group = option_group;
 
 /// Whether --help leaves the options under this heading to --help-all.
 bool is_for_few(const std::string& group);

@@ -12,8 +12,9 @@
 #include "tools/darb/info_text.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/scene_file.h"
 #include "tools/darb/scene_info.h"
+#include "tools/darb/unit_flags.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
 

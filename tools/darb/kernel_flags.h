@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/kernels/kernel_words.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
@@ -38,10 +39,5 @@ SplatModel in_kernel(const KernelFlags& flags, SplatModel model);
 /// Throws Error naming `option` for an item that is no kernel, or one with more than one pulse.
 std::vector<int> kernels_from_list(const std::string& option, const std::string& list,
                                    const std::vector<std::filesystem::path>& files = {});
-
-/// The names that --kernel takes, with commas: built in, read from files, with shapes.
-std::string kernel_names();
-/// Those whose shape each splat learns.
-std::string shaped_kernel_names();
 
 }  // namespace darb

@@ -8,8 +8,8 @@
 #include "engine/core/say.h"
 #include "tools/darb/live_window.h"
 #include "tools/darb/open_cameras.h"
-#include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
+#include "trainer/job/scene_file.h"
 #include "viewer/display_loss.h"
 #include "viewer/seconds.h"
 

@@ -2,20 +2,15 @@
 
 #include <fmt/format.h>
 
-#include "engine/core/text.h"
+#include "engine/core/say.h"
 #include "engine/data/camera_list.h"
-#include "tools/darb/outputs.h"
 
 namespace darb {
-
-void print_notes(const std::vector<std::string>& notes) {
-    for (const std::string& note : notes) say_note("note: " + note);
-}
 
 std::vector<View> open_cameras(const std::filesystem::path& path, const DatasetOptions& options) {
     std::vector<std::string> notes;
     std::vector<View> views = load_cameras(path, options, &notes);
-    print_notes(notes);
+    say_notes(notes);
     return views;
 }
 

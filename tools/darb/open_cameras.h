@@ -2,15 +2,11 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 #include <vector>
 
 #include "engine/data/dataset.h"
 
 namespace darb {
-
-/// "note: ..." lines on stderr, as of Dataset::notes; none after -q.
-void print_notes(const std::vector<std::string>& notes);
 
 /// load_cameras, its notes printed.
 std::vector<View> open_cameras(const std::filesystem::path& path,

@@ -15,16 +15,14 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
-#include "tools/darb/scene_file.h"
-#include "tools/darb/user_folders.h"
+#include "engine/core/user_folders.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-bool notes_left_out = false;  // by the -q of this process's command
 
 using Identity = std::pair<dev_t, ino_t>;
 
@@ -270,12 +268,8 @@ void WrittenFiles::wrote(const Paths& outputs) const {
 }
 
 CLI::Option* add_quiet_flag(CLI::App& command, bool& quiet) {
-    const auto take = [&quiet](std::int64_t times) { notes_left_out = quiet = times > 0; };
+    const auto take = [&quiet](std::int64_t times) { leave_out_notes(quiet = times > 0); };
     return command.add_flag_function("-q,--quiet", take, "print paths, warnings and errors only");
-}
-
-void say_note(std::string_view line) {
-    if (!notes_left_out) say("{}\n", line);
 }
 
 void tell_paths(bool quiet, const Paths& written) {

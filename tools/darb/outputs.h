@@ -61,8 +61,6 @@ class WrittenFiles {
 
 /// -q, the same in every command: paths of what was written, warnings and errors are printed.
 CLI::Option* add_quiet_flag(CLI::App& command, bool& quiet);
-/// A line on stderr that is neither warning nor error: nothing after -q, whichever option took it.
-void say_note(std::string_view line);
 /// A line with each on stdout where quiet; who is not finds them in the text. Empty paths and "-"
 /// do not count.
 void tell_paths(bool quiet, const Paths& written);

@@ -1,7 +1,7 @@
 #include "tools/darb/palette_device.h"
 
 #include "engine/core/error.h"
-#include "tools/darb/device_options.h"
+#include "engine/gpu/device_environment.h"
 
 namespace darb {
 

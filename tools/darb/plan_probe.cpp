@@ -6,12 +6,12 @@
 
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
-#include "tools/darb/effect_flags.h"
 #include "tools/darb/probe_arms.h"
 #include "tools/darb/scene_evaluation.h"
 #include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_stats.h"
 #include "trainer/growth/initial_model.h"
+#include "trainer/job/job.h"
 
 namespace darb {
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "engine/data/compare_view.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/render/renderer.h"
@@ -48,7 +49,7 @@ Refiner::Refiner(const std::filesystem::path& dataset, const DatasetOptions& opt
     DatasetOptions with_split = options;
     with_split.hold_out = true;
     dataset_ = load_dataset(dataset, with_split);
-    print_notes(dataset_.notes);
+    say_notes(dataset_.notes);
     bool trains = false, tests = false;
     for (const View& view : dataset_.views) (view.is_test ? tests : trains) = true;
     if (!trains || !tests)

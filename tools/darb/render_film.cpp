@@ -9,14 +9,14 @@
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/metrics.h"
+#include "engine/gpu/device_environment.h"
+#include "engine/plan/effect_plan.h"
 #include "engine/raster/frame_view.h"
 #include "engine/render/renderer.h"
-#include "tools/darb/device_options.h"
-#include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/pixel_size.h"
-#include "tools/darb/scene_file.h"
+#include "trainer/job/scene_file.h"
 #include "trainer/run/evaluation.h"
 #include "viewer/bounds.h"
 #include "viewer/path_export.h"
@@ -108,7 +108,7 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
         throw Error("-r", "divides the size of cameras, and there are none", "Use --size.");
     CameraPath path;
     if (!flags.film.path.empty()) path = read_camera_path(flags.film.path);
-    print_notes(path.notes);
+    say_notes(path.notes);
     const PixelSize size = film_size(flags.film, path);
     SplatFile facts;
     SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, &facts, flags.units));

@@ -5,11 +5,11 @@
 #include <set>
 
 #include "engine/core/say.h"
+#include "engine/gpu/device_environment.h"
+#include "engine/plan/tuner.h"
 #include "engine/scene/splat_file.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/evaluation_flags.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_stats.h"
 
 namespace darb {

@@ -15,22 +15,21 @@
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/data/run_colmap.h"
+#include "engine/gpu/device_environment.h"
+#include "engine/plan/tuner.h"
 #include "engine/ranks/ranks.h"
 #include "engine/scene/splat_file.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/live_view.h"
-#include "tools/darb/outputs.h"
 #include "tools/darb/page_output.h"
 #include "tools/darb/rank_tuning.h"
-#include "tools/darb/scene_file.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/train_blocks.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
 #include "tools/darb/train_summary.h"
-#include "tools/darb/tune_flags.h"
 #include "trainer/job/job.h"
+#include "trainer/job/scene_file.h"
 #include "trainer/job/training_data.h"
 #include "trainer/run/forecast.h"
 #include "trainer/run/run_folder.h"
@@ -65,12 +64,12 @@ void refuse_stereo(const TrainJob& job, int ranks) {
 }
 
 // Whatever takes a folder or a window for itself.
-void check_for_ranks(const Ranks& ranks, const TrainFlags& flags) {
+void check_for_ranks(const Ranks& ranks, const TrainRequest& request, bool view) {
     if (ranks.count() == 1) return;
-    if (flags.view)
+    if (view)
         throw Error("--view", fmt::format("has no place in a run of {} ranks", ranks.count()),
                     "Leave it out; darb view opens what the run saves.");
-    refuse_without_cameras(flags.request, ranks.count());
+    refuse_without_cameras(request, ranks.count());
 }
 
 // `darb train --resume -o OUT` alone goes on with the request of the run. What was typed beside it
@@ -98,27 +97,31 @@ void recall_request(const std::vector<std::string>& typed, TrainRequest& request
     request = std::move(recalled);
 }
 
-int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, const std::vector<std::string>& typed) {
+// What follows from the command line, before anything is opened.
+void complete_flags(TrainRequest& request, bool quiet) {
+    const bool named = !request.output.empty();
+    complete_request(request);
+    require_places(request);
+    if (!named && !quiet) say("output: {}; -o names another\n", request.output.string());
+}
+
+int train(Ranks& ranks, TrainFlags flags, const std::vector<std::string>& typed) {
     TrainRequest& request = flags.request;
-    request.tune = tune.choice;
-    const bool recalled = request.resume && request.dataset.empty() && !request.output.empty();
-    if (recalled)
+    const RunShown& shown = flags.shown;
+    if (request.resume && request.dataset.empty() && !request.output.empty())
         recall_request(typed, request);
     else
-        finish_train_flags(flags);
-    tune.choice = request.tune;
-    if (request.dataset.empty())
-        throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
-    if (!request.blocks.empty()) return train_blocks(ranks, flags, tune);
-    check_for_ranks(ranks, flags);
+        complete_flags(request, shown.quiet);
+    if (!request.blocks.empty()) return train_blocks(ranks, request, shown, flags.retune);
+    check_for_ranks(ranks, request, shown.view);
 
     DeviceOptions device_options = command_device(request.device);
-    const LiveSystem live(flags.view, device_options);
+    const LiveSystem live(shown.view, device_options);
     Device device(device_options);
-    settle_tuning(device, tune);
-    take_tuning_of_first(ranks, device, request.allow_mixed || !tune.choice.empty());
+    settle_tuning(device, request.tune, flags.retune);
+    take_tuning_of_first(ranks, device, request.allow_mixed || !request.tune.empty());
     std::optional<RunLock> lock;
-    Dataset dataset = load_training_data(request, lock, {flags.quiet, &stop_on_signals()});
+    Dataset dataset = load_training_data(request, lock, {shown.quiet, &stop_on_signals()});
     if (ranks.is_first()) {
         check_run_folder(request.output, dataset);
         if (!lock) lock.emplace(request.output);
@@ -128,19 +131,19 @@ int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, const std::vector<std:
     for (const std::string& note : job.notes) say_note("note: " + note);
     find_start(device, job, say_stereo_begins);
     std::atomic<bool>& stop = stop_on_signals();
-    JobSinks sinks{.quiet = flags.quiet, .stop = &stop, .ranks = {&ranks, request.allow_mixed}};
+    JobSinks sinks{.quiet = shown.quiet, .stop = &stop, .ranks = {&ranks, request.allow_mixed}};
     if (!ranks.is_first()) {
         run(device, job, sinks);
         return 0;
     }
     if (job.resume_from.empty())  // before the forecast, which makes them
         check_start_memory(device, job.dataset, job.options);
-    print_plan(device, job, flags);
+    print_plan(device, job, shown.quiet);
     const std::unique_ptr<LiveView> view =
         live.open(device, job.dataset, stop, request.train.white_background);
     if (view) sinks.on_step = [&](const LiveStep& step) { return view->show(step); };
     const TrainResult result = run(device, job, sinks);
-    if (!write_or_let_go(summary_text(result, flags, sinks.ranks)))
+    if (!write_or_let_go(summary_text(result, shown, request.output, sinks.ranks)))
         throw Error("standard output", std::string("cannot be written: ") + std::strerror(errno),
                     "The run is complete: its folder holds everything.");
     leave_page(device, job, result);
@@ -152,15 +155,13 @@ int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, const std::vector<std:
 
 void add_train(CLI::App& app, Action& action, const std::vector<std::string>& arguments) {
     auto flags = std::make_shared<TrainFlags>();
-    auto tune = std::make_shared<TuneFlags>();
     CLI::App* command = app.add_subcommand("train", "Train a splat scene from photos");
     add_train_flags(*command, *flags);
-    add_tune_flags(*command, *tune);
-    command->callback([flags, tune, arguments, &action] {
-        action = [flags, tune, arguments] {
+    command->callback([flags, arguments, &action] {
+        action = [flags, arguments] {
             return with_ranks([&](Ranks& ranks) {
                 try {
-                    return train(ranks, *flags, *tune, arguments);
+                    return train(ranks, *flags, arguments);
                 } catch (const ColmapStopped&) {
                     return stop_exit_code();
                 }

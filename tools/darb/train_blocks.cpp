@@ -8,10 +8,9 @@
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/core/text.h"
-#include "tools/darb/device_options.h"
-#include "tools/darb/effect_flags.h"
+#include "engine/gpu/device_environment.h"
+#include "engine/plan/tuner.h"
 #include "tools/darb/open_cameras.h"
-#include "tools/darb/outputs.h"
 #include "tools/darb/rank_tuning.h"
 #include "tools/darb/scene_evaluation.h"
 #include "tools/darb/stop_signals.h"
@@ -47,24 +46,24 @@ void print_blocks_plan(const Device& device, const TrainJob& job) {
     const std::size_t held_out = held_out_views(dataset.views).size();
     say("{}: {}, {} photos to train on, {} held out, {} points\n", dataset.root.string(),
         dataset.source, dataset.views.size() - held_out, held_out, dataset.points.size());
-    print_notes(dataset.notes);
+    say_notes(dataset.notes);
     say("device: {}\neffects: {}\n", device.description(), plan_line(job.effects));
     if (!job.strategy_note.empty()) say("{}\n", job.strategy_note);
 }
 
-std::string summary_of(const BlocksSummary& summary, const TrainFlags& flags) {
+std::string summary_of(const BlocksSummary& summary, bool quiet,
+                       const std::filesystem::path& output) {
     const BlocksManifest& m = summary.manifest;
     std::string text;
-    if (!flags.quiet && !summary.interrupted) text = blocks_table(m);
-    if (!flags.quiet && m.held_out > 0)
+    if (!quiet && !summary.interrupted) text = blocks_table(m);
+    if (!quiet && m.held_out > 0)
         text += fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f} over {} views\n", m.psnr_db,
                             m.ssim, m.held_out);
-    const char* what = flags.quiet ? "" : "scene    ";
+    const char* what = quiet ? "" : "scene    ";
     if (!summary.scene.empty()) text += what + summary.scene.string() + "\n";
     if (summary.interrupted)
         text += fmt::format("interrupted{}{}; go on with: darb train --resume -o '{}'\n",
-                            stop_exit_code() == 0 ? "" : " by ", stop_name(),
-                            flags.request.output.string());
+                            stop_exit_code() == 0 ? "" : " by ", stop_name(), output.string());
     return text;
 }
 
@@ -86,13 +85,12 @@ Grid parse_blocks(const std::string& text) {
 
 namespace {
 
-void check_for_blocks(const TrainFlags& flags) {
-    const TrainRequest& r = flags.request;
+void check_for_blocks(const TrainRequest& r, const RunShown& shown) {
     const auto refuse = [](bool given, const char* option, const char* hint) {
         if (given) throw Error(option, "has no place beside --blocks", hint);
     };
     constexpr const char* kAfter = "Leave it out: darb eval and darb convert take the scene.";
-    refuse(flags.view, "--view", "Leave it out; darb view opens the scene.");
+    refuse(shown.view, "--view", "Leave it out; darb view opens the scene.");
     refuse(r.page, "--html", "Leave it out; darb convert OUT page.html writes the page.");
     refuse(!r.start_checkpoint.empty(), "--start-checkpoint",
            "Leave it out; --resume goes on with a run in blocks.");
@@ -100,7 +98,7 @@ void check_for_blocks(const TrainFlags& flags) {
     refuse(!r.save_iterations.empty(), "--save-iterations", kAfter);
     refuse(!r.checkpoint_iterations.empty(), "--checkpoint-iterations",
            "Leave it out; --checkpoint-interval is for each block.");
-    refuse(flags.verbose, "--verbose", "Leave it out: each block's metrics.json has its passes.");
+    refuse(shown.verbose, "--verbose", "Leave it out: each block's metrics.json has its passes.");
     refuse(r.allow_mixed, "--allow-mixed", "Leave it out: each block is trained on one rank.");
     refuse(r.train.start == StartPoints::dense || r.train.start == StartPoints::random,
            "--start dense or random", "Use --start auto or points.");
@@ -115,13 +113,13 @@ void check_for_blocks(const TrainFlags& flags) {
 
 }  // namespace
 
-int train_blocks(Ranks& ranks, const TrainFlags& flags, const TuneFlags& tune) {
-    TrainRequest request = flags.request;
+int train_blocks(Ranks& ranks, const TrainRequest& asked_run, const RunShown& shown, bool retune) {
+    TrainRequest request = asked_run;
     const Grid asked = parse_blocks(request.blocks);
-    check_for_blocks(flags);
+    check_for_blocks(request, shown);
     refuse_without_cameras(request, ranks.count());
     std::optional<RunLock> lock;
-    Dataset dataset = load_training_data(request, lock, {flags.quiet, &stop_on_signals()});
+    Dataset dataset = load_training_data(request, lock, {shown.quiet, &stop_on_signals()});
     if (ranks.is_first()) {
         check_run_folder(request.output, dataset);
         if (!lock) lock.emplace(request.output);
@@ -132,25 +130,26 @@ int train_blocks(Ranks& ranks, const TrainFlags& flags, const TuneFlags& tune) {
     std::optional<Tuning> tuning;  // the same for every part, on every rank
     const auto device = [&] {
         auto made = std::make_unique<Device>(command_device(request.device));
-        tuning ? made->set_tuning(*tuning) : settle_tuning(*made, tune);
+        tuning ? made->set_tuning(*tuning) : settle_tuning(*made, request.tune, retune);
         return made;
     };
     auto first = device();
-    take_tuning_of_first(ranks, *first, !tune.choice.empty());
+    take_tuning_of_first(ranks, *first, !request.tune.empty());
     tuning = first->tuning();
-    if (ranks.is_first() && !flags.quiet) print_blocks_plan(*first, job);
+    if (ranks.is_first() && !shown.quiet) print_blocks_plan(*first, job);
     first.reset();  // each part has one of its own
     const BlocksJob blocks{
         job.dataset,
         job.options,
-        run_options(job, {.quiet = flags.quiet}),
+        run_options(job, {.quiet = shown.quiet}),
         asked,
         request.resume,
         ranks,
         device,
         [&](const SplatModel& scene) { return evaluate_joined(*device(), job, scene); }};
     const BlocksSummary summary = run_blocks(blocks, stop);
-    if (ranks.is_first()) write_or_let_go(printable(summary_of(summary, flags), true));
+    if (ranks.is_first())
+        write_or_let_go(printable(summary_of(summary, shown.quiet, request.output), true));
     return summary.interrupted ? stop_exit_code() : 0;
 }
 

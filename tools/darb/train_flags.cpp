@@ -2,153 +2,125 @@
 
 #include <fmt/format.h>
 
-#include <map>
+#include <cstdint>
+#include <utility>
 
-#include "tools/darb/effect_flags.h"
-#include "tools/darb/help.h"
-#include "tools/darb/kernel_flags.h"
-#include "tools/darb/numbers.h"
+#include "engine/core/error.h"
 #include "tools/darb/outputs.h"
-#include "trainer/options/strategy.h"
+#include "tools/darb/tune_flags.h"
 
 namespace darb {
 
 namespace {
 
-const std::map<std::string, StartPoints> kStarts = {{"auto", StartPoints::automatic},
-                                                    {"points", StartPoints::points},
-                                                    {"dense", StartPoints::dense},
-                                                    {"random", StartPoints::random}};
+struct Removed {
+    const char* flags;
+    const char* reason;
+    const char* instead;
+};
 
-// Before every option that it changes: values are taken over in this order.
-void add_schedule_flag(CLI::App& command, TrainFlags& f) {
-    command
-        .add_option_function<std::string>(
-            "--schedule", [&f](const std::string& schedule) { use_schedule(f.request, schedule); },
-            "3dgs: its rates, limits, resets and background, no regularisers, harmonics by the "
-            "iteration, whole photos, in runs of any length; options that are given beside it "
-            "count")
-        ->check(CLI::IsMember({"darb", "3dgs"}))
-        ->default_str("darb")
-        ->group(option_group::kRates);
+constexpr Removed kRemoved[] = {
+    {"--position-lr-falls", "is no option any more",
+     "It follows from --average-from: 1 lets the rate fall for the whole run, as 3DGS does."},
+    {"--final-lr-share", "is no option any more",
+     "It follows from --average-from: rates stay in a run that ends with a mean, and fall in one "
+     "that does not."},
+    {"--opacity-decay", "is no option any more",
+     "The strategy budget is adc, steered to a number: it resets opacities as adc does."},
+};
+
+// Options that are no more, as flags that are not shown: an Error says what replaced them.
+void add_removed_options(CLI::App& command) {
+    for (const Removed& one : kRemoved)
+        command
+            .add_option_function<std::string>(one.flags,
+                                              [&one](const std::string&) {
+                                                  const std::string flags = one.flags;
+                                                  throw Error(flags.substr(0, flags.find(',')),
+                                                              one.reason, one.instead);
+                                              })
+            ->expected(0, 1)
+            ->group("");
 }
 
-void add_scene_flags(CLI::App& command, TrainFlags& f) {
-    add_kernel_flags(command, f.kernel,
-                     kernel_names() +
-                         " (each splat learns its shape), or one of your own: \"expr: (1 - "
-                         "q/9)^3, support 9\"",
-                     option_group::kScene);
-    command.get_option("--kernel")->default_str("gaussian");
-    std::string strategies;
-    for (const Strategy strategy : all_strategies())
-        strategies += fmt::format("{}{} ({})", strategies.empty() ? "" : "; ",
-                                  strategy_name(strategy), strategy_row(strategy).summary);
-    command.add_option("--strategy", f.strategy, "how the splats grow: " + strategies)
-        ->capture_default_str()
-        ->group(option_group::kScene);
-    command
-        .add_option("--start", f.request.train.start,
-                    "what splats start from; dense: surfaces that stereo between the photos finds; "
-                    "auto: points of the data set, else dense, else random")
-        ->transform(CLI::CheckedTransformer(kStarts, CLI::ignore_case).description(""))
-        ->type_name("TEXT:{auto,points,dense,random}")
-        ->default_str("auto")
-        ->group(option_group::kStart);
-    add_effects_flag(command, f.effects);
-    command.get_option("--effects")->group(option_group::kScene);
-    command.add_flag("--antialiasing", f.request.antialiasing, "as --effects +antialias")
-        ->group(option_group::kEffects);
-    command
-        .add_option("-d,--depths", f.depths,
-                    "as --effects +depth; FOLDER: of the measured depths, depths or depth in the "
-                    "data set")
-        ->type_name("FOLDER")
-        ->group(option_group::kEffects);
-    command
-        .add_option("--refine-cameras", f.request.refine_cameras,
-                    "train poses and intrinsics beside the splats, as --effects +cameras; auto: as "
-                    "the plan says, off")
-        ->check(CLI::IsMember({"auto", "on", "off"}))
-        ->capture_default_str()
-        ->group(option_group::kEffects);
-    command
-        .add_option("--pulses", f.pulses,
-                    "of raised_cosine and sinc: 2 or 3 keep rings that the paper's limit removes")
-        ->capture_default_str()
-        ->check(CLI::Range(1, KERNEL_MAX_PULSES))
-        ->group(help_group::kAccuracy);
-    add_accuracy_flags(command, f.accuracy, true);
-    command
-        .add_option("--blocks", f.request.blocks, "train a scene too large for the memory in parts")
-        ->type_name("TEXT:{auto,NxM}")
-        ->group(option_group::kScene);
+void add_row(CLI::App& command, const RequestOption& option, GivenOptions& given) {
+    const OptionRow& row = option.row;
+    const std::string name = option_name(row);
+    if (row.is_switch) {
+        command
+            .add_flag_function(
+                row.flags,
+                [name, &given](std::int64_t count) {
+                    given.emplace_back(name, count > 0 ? "on" : "off");
+                },
+                row.help)
+            ->group(row.group);
+        return;
+    }
+    CLI::Option* added = nullptr;
+    if (option.several)
+        added = command.add_option_function<std::vector<std::string>>(
+            row.flags,
+            [name, &given](const std::vector<std::string>& values) {
+                for (const std::string& value : values) given.emplace_back(name, value);
+            },
+            row.help);
+    else
+        added = command.add_option_function<std::string>(
+            row.flags,
+            [name, &given](const std::string& value) { given.emplace_back(name, value); },
+            row.help);
+    added->default_str(default_text(row))->group(row.group);
+    if (*option.words != '\0') added->type_name(fmt::format("TEXT:{{{}}}", option.words));
+    if (option.before_others) added->allow_extra_args(false);
 }
 
-void add_run_flags(CLI::App& command, TrainFlags& f) {
-    command
-        .add_flag("--resume", f.request.resume,
-                  "go on from OUT/checkpoint.darb; `darb train --resume -o OUT` is enough")
-        ->group(option_group::kRun);
-    command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training")
-        ->group(option_group::kRun);
-    command
-        .add_flag("--allow-mixed", f.request.allow_mixed,
-                  "ranks of mpirun may have other devices and drivers; the result then depends on "
-                  "which")
-        ->group(help_group::kDevice);
-    add_quiet_flag(command, f.quiet)->group(option_group::kRun);
-    command.add_flag("--verbose", f.verbose, "print the time of each pass at the end")
-        ->group(help_group::kDevice);
-    command
-        .add_option("--device", f.request.device, "number or part of a name, see `darb devices`")
-        ->group(option_group::kRun);
-    command.add_flag("--deterministic", f.deterministic)->group("");
-}
-
-void add_saving_flags(CLI::App& command, TrainFlags& f) {
-    const auto at_least_one = CLI::Range(1, 1'000'000'000);
-    for (const auto& [name, list, help] :
-         {std::tuple{"--test-iterations", &f.request.test_iterations,
-                     "evaluate after these (default 7000 30000 and the last)"},
-          {"--save-iterations", &f.request.save_iterations,
-           "write a PLY after these (default 7000 30000 and the last)"},
-          {"--checkpoint-iterations", &f.request.checkpoint_iterations,
-           "keep a checkpoint of its own after these"}})
-        command.add_option(name, *list, help)->check(at_least_one)->group(help_group::kSaving);
-    command
-        .add_option("--checkpoint-interval", f.request.checkpoint_interval,
-                    "refresh checkpoint.darb every so many iterations; 0: at the end only")
-        ->capture_default_str()
-        ->check(zero_or_more())
-        ->group(help_group::kSaving);
-    command
-        .add_option("--start-checkpoint", f.request.start_checkpoint, "go on from this checkpoint")
-        ->group(help_group::kSaving);
-    command
-        .add_flag("--report,!--no-report", f.request.report,
-                  "write OUT/report.html at the end (default): curves, time by pass, pictures")
-        ->group(help_group::kSaving);
-    command
-        .add_flag("--html", f.request.page,
-                  "write OUT/scene.html at the end: a web page that shows the scene")
-        ->group(help_group::kSaving);
+// How the command shows its run, beside the rows that help has before them.
+void add_own_flags(CLI::App& command, const std::string& behind, TrainFlags& f) {
+    if (behind == "--resume") {
+        command
+            .add_flag("--view", f.shown.view,
+                      "follow the run in a window; closing it goes on training")
+            ->group(option_group::kRun);
+        add_quiet_flag(command, f.shown.quiet)->group(option_group::kRun);
+    } else if (behind == "--allow-mixed") {
+        command.add_flag("--verbose", f.shown.verbose, "print the time of each pass at the end")
+            ->group(option_group::kDevice);
+    } else if (behind == "--tune") {
+        add_retune_flag(command, f.retune);
+    }
 }
 
 }  // namespace
 
 void add_train_flags(CLI::App& command, TrainFlags& f) {
-    add_schedule_flag(command, f);
-    add_data_flags(command, f);
-    add_run_flags(command, f);
-    add_scene_flags(command, f);
-    add_option_rows(command, f.request.train, f.of_strategies);
-    add_saving_flags(command, f);
+    for (const RequestOption& option : request_options()) {
+        if (*option.row.flags == '\0') continue;
+        add_row(command, option, f.given);
+        add_own_flags(command, option_name(option.row), f);
+    }
+    command.add_flag("--deterministic", f.deterministic)->group("");
     add_removed_options(command);
-    command.parse_complete_callback([&command, &f] {
-        f.length_given = command.count("--iterations") > 0;
-        f.width_given = command.count("--resolution") > 0;
-    });
+    command.parse_complete_callback([&f] { set_request_options(f.request, f.given); });
+}
+
+TrainRequest parse_train_words(std::vector<std::string> words, const std::string& options,
+                               const std::string& command) {
+    words.insert(words.begin(), "train");
+    for (const std::string& word : CLI::detail::split_up(options)) words.push_back(word);
+    TrainFlags f;
+    CLI::App app;
+    add_train_flags(*app.add_subcommand("train"), f);
+    try {
+        app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+    } catch (const CLI::ParseError& e) {
+        throw Error(command, e.what(), "`darb train --help` lists what --train-options takes.");
+    }
+    for (const char* own : {"--blocks", "--tune"})
+        if (was_given(f.request, own))
+            throw Error(command + " " + own, "is an option of darb train alone", "Leave it out.");
+    complete_request(f.request);
+    return std::move(f.request);
 }
 
 }  // namespace darb

@@ -7,14 +7,15 @@
 #include <optional>
 
 #include "engine/core/say.h"
-#include "tools/darb/device_options.h"
+#include "engine/data/run_colmap.h"
+#include "engine/gpu/device_environment.h"
 #include "tools/darb/open_cameras.h"
-#include "tools/darb/outputs.h"
-#include "tools/darb/train_presets.h"
+#include "trainer/job/request_options.h"
+#include "trainer/options/presets.h"
 #include "trainer/options/schedule.h"
 #include "trainer/run/forecast.h"
 #include "trainer/run/progress.h"
-#include "trainer/step/memory_plan.h"
+#include "trainer/step/photos.h"
 
 namespace darb {
 
@@ -99,17 +100,68 @@ void print_advice(const Device& device, const Dataset& dataset, const Forecast& 
         say("hint:{}\n", advice);
 }
 
-void print_forecast(const Device& device, TrainJob& job, const TrainFlags& flags) {
+constexpr double kSlowSeconds = 1'800;  // of a bare run: from here on a quicker one is suggested
+
+// The data set with photos of at most that width.
+Dataset at_width(Dataset dataset, int width) {
+    for (View& view : dataset.views)
+        if (view.camera.width > width)
+            view.camera = divided(view.camera, double(view.camera.width) / width);
+    return dataset;
+}
+
+std::string time_of(double seconds) {
+    return seconds > 0 ? "about " + format_duration(seconds) : "not measured";
+}
+
+// A word that the shell takes apart stands in quotes.
+std::string typed(const std::string& word) {
+    const bool plain = word.find_first_of(" '\"\\$`&|;<>()*?[]#~!{}") == std::string::npos;
+    return plain ? word : shell_quoted(word);
+}
+
+// How long the preset of a run and those below it take here, and of a bare run that is slow what to
+// type instead; nothing where --iterations was given. chosen: the forecast of the run. Measures
+// each for a few seconds.
+void print_presets(Device& scratch, const TrainJob& job, const Forecast& chosen) {
+    const TrainRequest& request = job.request;
+    if (was_given(request, "--iterations") || chosen.seconds <= 0) return;
+    const bool width_given = was_given(request, "--resolution");
+    const std::string_view own = request.preset.empty() ? kRunPresets.back().name : request.preset;
+    std::string line, instead;
+    for (const RunPreset& preset : kRunPresets) {
+        double seconds = chosen.seconds;
+        if (preset.name != own) {
+            TrainOptions options = job.options;
+            options.iterations = preset.iterations;
+            seconds = forecast_training(
+                          scratch, width_given ? job.dataset : at_width(job.dataset, preset.width),
+                          options)
+                          .seconds;
+        }
+        line += fmt::format("{}{} ({}; {} iterations{}) {}", line.empty() ? "" : ", ", preset.name,
+                            preset.summary, preset.iterations,
+                            width_given ? "" : fmt::format(" at {} px", preset.width),
+                            time_of(seconds));
+        if (preset.name == own) break;  // those above take longer still, and longer to measure
+        instead += fmt::format("\n  darb train {} -o {} --preset {}    {}", typed(request.dataset),
+                               typed(request.output.string()), preset.name, time_of(seconds));
+    }
+    say("presets: {}\n", line);
+    if (request.preset.empty() && chosen.seconds > kSlowSeconds && !instead.empty())
+        say("This takes {} here. Quicker, after Ctrl-C:{}\n", time_of(chosen.seconds), instead);
+}
+
+void print_forecast(const Device& device, TrainJob& job, bool quiet) {
     const Dataset& dataset = job.dataset;
     DeviceOptions options = command_device(job.request.device);
     Device scratch(options);
     scratch.set_tuning(device.tuning());
     const Forecast f =
         forecast_training(scratch, dataset, job.options, job.options.iterations >= kShortRun);
-    const bool quiet = flags.quiet;
     if (!quiet) say("forecast: {}; {}\n", time_text(f, job.options), memory_text(device, f));
     print_advice(device, dataset, f, quiet);
-    if (!quiet) print_presets(scratch, job, flags, f);
+    if (!quiet) print_presets(scratch, job, f);
     job.pace = pace_of(f);
 }
 
@@ -127,7 +179,7 @@ void print_scene(const Device& device, const TrainJob& job, std::size_t held_out
     const Dataset& dataset = job.dataset;
     say("{}: {}, {} photos to train on, {} held out, {} points\n", dataset.root.string(),
         dataset.source, dataset.views.size() - held_out, held_out, dataset.points.size());
-    print_notes(dataset.notes);
+    say_notes(dataset.notes);
     say("device: {}\n", device.description());
     say("effects: {}\n", plan_line(job.effects));
     for (const std::string& note : {job.cameras_note, job.start_note, job.strategy_note})
@@ -141,14 +193,14 @@ void say_stereo_begins() {
     say_note("start: stereo between the photos, about a second of a core for each");
 }
 
-void print_plan(Device& device, TrainJob& job, const TrainFlags& flags) {
+void print_plan(Device& device, TrainJob& job, bool quiet) {
     const Dataset& dataset = job.dataset;
     const auto held_out =
         static_cast<std::size_t>(std::ranges::count_if(dataset.views, &View::is_test));
-    if (!flags.quiet) print_scene(device, job, held_out);
+    if (!quiet) print_scene(device, job, held_out);
     // A resumed run knows better: its progress shows the time left.
     if (job.resume_from.empty() && held_out < dataset.views.size())
-        print_forecast(device, job, flags);
+        print_forecast(device, job, quiet);
 }
 
 }  // namespace darb

@@ -41,9 +41,9 @@ std::string ranks_text(const RankGroup& ranks, const TrainResult& summary) {
 
 }  // namespace
 
-std::string summary_text(const TrainResult& summary, const TrainFlags& flags,
-                         const RankGroup& ranks) {
-    const bool quiet = flags.quiet;
+std::string summary_text(const TrainResult& summary, const RunShown& shown,
+                         const std::filesystem::path& output, const RankGroup& ranks) {
+    const bool quiet = shown.quiet;
     std::string text;
     if (!quiet)
         text = fmt::format("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
@@ -53,7 +53,7 @@ std::string summary_text(const TrainResult& summary, const TrainFlags& flags,
                             e.splats);
     }
     if (!quiet) text += ranks_text(ranks, summary);
-    if (!quiet && flags.verbose) text += passes_text(summary.passes);
+    if (!quiet && shown.verbose) text += passes_text(summary.passes);
     const auto written = [&](const char* what, const std::filesystem::path& path) {
         if (path.empty()) return;
         text += (quiet ? "" : fmt::format("{:<9}", what)) + path.string() + "\n";
@@ -63,8 +63,7 @@ std::string summary_text(const TrainResult& summary, const TrainFlags& flags,
     written("report", summary.report);
     if (summary.interrupted)
         text += fmt::format("interrupted{}{}; go on with: darb train --resume -o '{}'\n",
-                            stop_exit_code() == 0 ? "" : " by ", stop_name(),
-                            flags.request.output.string());
+                            stop_exit_code() == 0 ? "" : " by ", stop_name(), output.string());
     return printable(text, true);
 }
 

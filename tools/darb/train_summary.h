@@ -1,15 +1,21 @@
 // What `darb train` says at the end of a run.
 #pragma once
 
+#include <filesystem>
 #include <string>
 
-#include "tools/darb/train_flags.h"
 #include "trainer/run/run.h"
 
 namespace darb {
 
-/// Of a quiet run the paths, and what goes on with one that was interrupted.
-std::string summary_text(const TrainResult& summary, const TrainFlags& flags,
-                         const RankGroup& ranks);
+/// How the command shows a run.
+struct RunShown {
+    bool quiet = false, verbose = false;  // less and more on the terminal
+    bool view = false;                    // in a window
+};
+
+/// Of a quiet run the paths, and what goes on with one that was interrupted in its folder `output`.
+std::string summary_text(const TrainResult& summary, const RunShown& shown,
+                         const std::filesystem::path& output, const RankGroup& ranks);
 
 }  // namespace darb

@@ -9,7 +9,7 @@
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/scene_file.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
 

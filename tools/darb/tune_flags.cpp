@@ -1,31 +1,21 @@
 #include "tools/darb/tune_flags.h"
 
-#include <fmt/format.h>
-
-#include <cstdlib>
-
-#include "engine/plan/tuner.h"
-#include "tools/darb/help.h"
-#include "tools/darb/outputs.h"
-#include "tools/darb/user_folders.h"
+#include "engine/core/user_folders.h"
+#include "trainer/job/request_options.h"
 
 namespace darb {
 
 void add_tune_flags(CLI::App& command, TuneFlags& flags) {
-    command
-        .add_option("--tune", flags.choice,
-                    "run passes in these ways, such as blend=128x2,backward=buckets; an "
-                    "unknown name lists those of the device")
-        ->group(help_group::kDevice);
-    command
-        .add_flag("--retune", flags.retune,
-                  "measure which ways are the fastest on this device, and keep the result")
-        ->group(help_group::kDevice);
+    const OptionRow& row = request_option("--tune").row;
+    command.add_option(row.flags, flags.choice, row.help)->group(row.group);
+    add_retune_flag(command, flags.retune);
 }
 
-void settle_tuning(Device& device, const TuneFlags& flags) {
-    const char* environment = std::getenv("DARB_TUNE");
-    tune(device, {flags.choice, environment != nullptr ? environment : "", flags.retune, say_note});
+void add_retune_flag(CLI::App& command, bool& retune) {
+    command
+        .add_flag("--retune", retune,
+                  "measure which ways are the fastest on this device, and keep the result")
+        ->group(option_group::kDevice);
 }
 
 std::string tuning_of_listed(const DeviceInfo& info) {

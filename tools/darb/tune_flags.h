@@ -5,6 +5,7 @@
 #include <string>
 
 #include "engine/gpu/device.h"
+#include "engine/plan/tuner.h"
 
 namespace darb {
 
@@ -14,10 +15,13 @@ struct TuneFlags {
 };
 
 void add_tune_flags(CLI::App& command, TuneFlags& flags);
+/// --retune alone.
+void add_retune_flag(CLI::App& command, bool& retune);
 
-/// engine/plan/tuner.h, with its lines on stderr. Before anything is made for the device. Throws
-/// Error for names that are not known.
-void settle_tuning(Device& device, const TuneFlags& flags = {});
+/// What the flags ask for, see engine/plan/tuner.h.
+inline void settle_tuning(Device& device, const TuneFlags& flags) {
+    settle_tuning(device, flags.choice, flags.retune);
+}
 
 /// What would run on a device that is only listed, and why.
 std::string tuning_of_listed(const DeviceInfo& info);

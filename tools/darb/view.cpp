@@ -8,16 +8,16 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "engine/core/text.h"
+#include "engine/core/user_folders.h"
 #include "engine/data/image_io.h"
+#include "engine/gpu/device_environment.h"
+#include "engine/plan/effect_plan.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/device_options.h"
-#include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/scene_file.h"
-#include "tools/darb/user_folders.h"
 #include "tools/darb/view_flags.h"
 #include "tools/darb/view_window.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
 

@@ -12,7 +12,8 @@
 #include "tools/darb/numbers.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/scene_file.h"
+#include "tools/darb/unit_flags.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
 

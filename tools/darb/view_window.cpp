@@ -4,8 +4,8 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/gpu/device_environment.h"
 #include "engine/scene/splat_file.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/view_times.h"
 #include "viewer/display_loss.h"

@@ -6,11 +6,11 @@
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/core/text.h"
+#include "engine/gpu/device_environment.h"
 #include "engine/scene/merge_splats.h"
 #include "engine/scene/sog.h"
 #include "tools/darb/compare_scenes.h"
 #include "tools/darb/convert_levels.h"
-#include "tools/darb/device_options.h"
 #include "tools/darb/refine_splats.h"
 
 namespace darb {

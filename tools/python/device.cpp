@@ -2,8 +2,8 @@
 
 #include <unistd.h>
 
-#include "tools/darb/device_options.h"
-#include "tools/darb/tune_flags.h"
+#include "engine/gpu/device_environment.h"
+#include "engine/plan/tuner.h"
 
 namespace darb::python {
 

@@ -5,14 +5,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tools/darb/effect_flags.h"
-#include "tools/darb/plan_price.h"
-#include "tools/darb/plan_subject.h"
-#include "tools/darb/scene_file.h"
+#include "tools/cost/effect_prices.h"
+#include "tools/cost/plan_subject.h"
 #include "tools/paper/psi_report.h"
 #include "tools/paper/study1d.h"
 #include "tools/python/arguments.h"
 #include "tools/python/kernel.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb::python {
 
@@ -129,37 +128,36 @@ py::object sim1d(const py::dict& given) {
 }
 
 py::object plan(const py::dict& given) {
-    PlanFlags flags;
-    flags.what = take_path(given["what"], "what");
-    if (!given["cameras"].is_none()) flags.cameras = take_path(given["cameras"], "cameras");
-    flags.effects = take_text(given["effects"], "effects");
-    flags.device = take_text(given["device"], "device");
-    flags.depth = take_flag(given["depth"], "depth");
-    flags.data.resolution =
+    PlanRequest request;
+    request.what = take_path(given["what"], "what");
+    if (!given["cameras"].is_none()) request.cameras = take_path(given["cameras"], "cameras");
+    request.effects = take_text(given["effects"], "effects");
+    request.device = take_text(given["device"], "device");
+    request.depth = take_flag(given["depth"], "depth");
+    request.data.resolution =
         static_cast<int>(take_integer(given["resolution"], "resolution", -1, 1 << 20));
-    flags.data.original_where_wide = true;
+    request.data.original_where_wide = true;
     if (!given["sh_degree"].is_none())
-        flags.sh_degree = static_cast<int>(take_integer(given["sh_degree"], "sh_degree", 0, 3));
-    if (!given["kernel"].is_none())
-        flags.kernel.kernel = kernel_name(take_kernel(given["kernel"], "kernel"));
+        request.sh_degree = static_cast<int>(take_integer(given["sh_degree"], "sh_degree", 0, 3));
+    if (!given["kernel"].is_none()) request.kernel = take_kernel(given["kernel"], "kernel");
     const bool price = take_flag(given["price"], "price");
     nlohmann::json result;
     {
         const py::gil_scoped_release free;
-        const bool scene = is_scene(flags.what);
+        const bool scene = is_scene(request.what);
         const EffectChoice choice = choose_effects(
-            flags.effects, scene ? EffectUse::pictures : EffectUse::training, flags.data);
-        const PlanSubject subject = open_subject(flags);
-        EffectPlan plan = plan_of(subject, flags, choice);
+            request.effects, scene ? EffectUse::pictures : EffectUse::training, request.data);
+        const PlanSubject subject = open_subject(request);
+        EffectPlan plan = plan_of(subject, request, choice);
         EffectPrices prices;
         if (price && (subject.training || subject.model.size() > 0)) {
             check_signals();
-            const Measured base = measure_subject(subject, flags, plan);
+            const Measured base = measure_subject(subject, request, plan);
             plan.note_frame(base.huge_splats, base.longest_list);
-            prices = price_effects(plan, base, switchable_effects(subject, flags),
-                                   degree_of(subject, flags), [&](const EffectPlan& p) {
+            prices = price_effects(plan, base, switchable_effects(subject, request),
+                                   degree_of(subject, request), [&](const EffectPlan& p) {
                                        check_signals();
-                                       return measure_subject(subject, flags, p);
+                                       return measure_subject(subject, request, p);
                                    });
         }
         result = priced_json(plan, prices);

@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
 
-#include "tools/darb/numbers.h"
-#include "tools/darb/train_flags.h"
 #include "tools/python/kernel.h"
+#include "trainer/job/request_options.h"
 
 namespace darb::python {
 
@@ -19,12 +20,13 @@ struct OfCommand {
 
 constexpr OfCommand kOfCommand[] = {
     {"output", "Call scene().write(path) when you want a file."},
-    {"model_path", "Call scene().write(path) when you want a file."},
-    {"source_path", "Give the data set as the first argument."},
     {"dataset", "Give the data set as the first argument."},
     {"device", "Give device= to Trainer itself."},
-    {"view", "Render with scene().render(...) between two steps."},
-    {"quiet", "Nothing is printed in any case."},
+    {"tune", "Set DARB_TUNE in the environment before the device is opened."},
+    {"allow_mixed", "A Trainer is one process."},
+    {"blocks", "The command trains in parts."},
+    {"html", "`darb convert` writes web pages."},
+    {"frames", "Videos go through `darb train` first."},
     {"resume", "Give start_checkpoint=path."},
     {"sequential", "Photos without cameras go through `darb train` first."},
     {"report", "The command writes reports."},
@@ -33,6 +35,26 @@ constexpr OfCommand kOfCommand[] = {
     {"checkpoint_iterations", "Call checkpoint(path) when you want it."},
     {"checkpoint_interval", "Call checkpoint(path) when you want it."},
 };
+
+// Of how the command shows a run, which no request holds.
+constexpr OfCommand kShown[] = {
+    {"view", "Render with scene().render(...) between two steps."},
+    {"quiet", "Nothing is printed in any case."},
+};
+
+// nullptr: a Trainer takes it, too.
+const OfCommand* row_of_command(const RequestOption& option) {
+    for (const OfCommand& one : kOfCommand)
+        if (&request_option(one.name) == &option) return &one;
+    return nullptr;
+}
+
+void refuse_of_command(const std::string& name) {
+    for (const OfCommand& one : kShown)
+        if (name == one.name) throw Error(name, "is an option of the command alone", one.instead);
+    if (const OfCommand* const one = row_of_command(request_option(name)))
+        throw Error(name, "is an option of the command alone", one->instead);
+}
 
 std::string value_text(const py::object& value, const std::string& name) {
     if (py::isinstance<py::str>(value)) return take_text(value, name.c_str());
@@ -45,58 +67,55 @@ std::string value_text(const py::object& value, const std::string& name) {
                 "Give a number, a text, or True for a flag.");
 }
 
-std::vector<std::string> words_of(const py::dict& options) {
-    std::vector<std::string> words;
+// What was given by name, without a kernel that is an object.
+GivenOptions given_options(const py::dict& options) {
+    GivenOptions given;
     for (const auto& [key, handle] : options) {
         const std::string name = take_text(py::reinterpret_borrow<py::object>(key), "option");
         const auto value = py::reinterpret_borrow<py::object>(handle);
         if (name == "kernel" && kernel_of_object(value)) continue;
-        for (const OfCommand& one : kOfCommand)
-            if (name == one.name)
-                throw Error(name, "is an option of the command alone", one.instead);
-        std::string flag = name;
-        std::replace(flag.begin(), flag.end(), '_', '-');
-        if (flag.empty() || flag.find('=') != std::string::npos || flag[0] == '-')
+        if (name.empty() || name[0] == '-' || name.find('=') != std::string::npos)
             throw Error("option " + name, "is no name", "Use those of `darb train --help-all`.");
-        const std::string dashes = flag.size() == 1 ? "-" : "--";
-        if (PyBool_Check(value.ptr()) != 0)
-            words.push_back((value.ptr() == Py_True ? dashes : "--no-") + flag);
-        else if (!value.is_none()) {
-            words.push_back(dashes + flag + (flag.size() == 1 ? "" : "=") +
-                            value_text(value, name));
-        }
+        refuse_of_command(name);
+        const RequestOption& option = request_option(name);
+        if (value.is_none()) continue;
+        const bool is_bool = PyBool_Check(value.ptr()) != 0;
+        if (is_bool && option_kind(option) != OptionKind::on_off)
+            throw Error(name, type_text(value) + ", and this option is no switch",
+                        fmt::format("It takes {}.", limits_text(option.row, option_kind(option))));
+        given.emplace_back(
+            name, is_bool ? (value.ptr() == Py_True ? "on" : "off") : value_text(value, name));
     }
-    return words;
+    return given;
 }
 
 }  // namespace
 
-TrainRequest take_train_options(const py::dict& options) {
-    std::vector<std::string> words = words_of(options);
-    refuse_empty_values(words);
-    TrainFlags flags;
-    CLI::App app;
-    add_train_flags(*app.add_subcommand("train"), flags);
-    words.insert(words.begin(), "train");
-    words.insert(words.end(), {"-q", "-o", "."});
-    try {
-        app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
-        refuse_no_numbers(app);
-    } catch (const CLI::ParseError& e) {
-        throw Error("darb.Trainer", e.what(),
-                    "`darb train --help-all` lists the options; here they have underscores.");
-    }
-    finish_train_flags(flags);
-    TrainRequest& request = flags.request;
-    if (!options.contains("kernel")) return request;
-    const auto own = kernel_of_object(options["kernel"]);
-    if (!own) return request;
-    if (flags.pulses != 1)
-        throw Error("pulses", "means nothing with a kernel of one's own", "Leave it out.");
-    if (request.train.footprint == Footprint::exact && !has_exact_footprint(*own))
-        throw Error("footprint exact", "is not there for this kernel", "Use psi.");
-    request.train.kernel = *own;
+TrainRequest take_train_options(const py::dict& options, std::string dataset) {
+    TrainRequest request;
+    request.dataset = std::move(dataset);
+    set_request_options(request, given_options(options));
+    if (options.contains("kernel"))
+        if (const auto own = kernel_of_object(options["kernel"])) {
+            if (was_given(request, "pulses"))
+                throw Error("pulses", "means nothing with a kernel of one's own", "Leave it out.");
+            request.train.kernel = *own;
+        }
+    complete_request(request);
     return request;
+}
+
+py::dict asked_options(const TrainRequest& request) {
+    nlohmann::json all = nlohmann::json::object();
+    for (const RequestOption& option : request_options()) {
+        if (option.key.empty() || *option.row.flags == '\0' || row_of_command(option) != nullptr)
+            continue;
+        std::string name = option_name(option.row).substr(2);
+        std::replace(name.begin(), name.end(), '-', '_');
+        all[name] = saved_value(option, request);
+    }
+    const std::string text = all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    return py::module_::import("json").attr("loads")(text);
 }
 
 }  // namespace darb::python

@@ -30,9 +30,8 @@ Dataset take_dataset(const py::object& given, const py::dict& options,
                             "Give it to Dataset.read.");
         dataset = given.cast<const PyDataset&>().data;
     } else {
-        const std::string path = take_path(given, "dataset");
         const py::gil_scoped_release free;
-        dataset = load_dataset(path, request.data);
+        dataset = load_dataset(request.dataset, request.data);
     }
     if (!dataset.options.hold_out)
         for (View& view : dataset.views) view.is_test = false;
@@ -82,7 +81,8 @@ class Training {
 PyTrainer::PyTrainer(std::shared_ptr<PyDevice> device, const py::object& dataset,
                      const py::dict& options)
     : device_(std::move(device)) {
-    job_.request = take_train_options(options);
+    const bool is_read = py::isinstance<PyDataset>(dataset);
+    job_.request = take_train_options(options, is_read ? "" : take_path(dataset, "dataset"));
     job_.dataset = take_dataset(dataset, options, job_.request);
     const py::gil_scoped_release free;
     const auto lock = device_->lock();
@@ -266,6 +266,9 @@ void bind_trainer(py::module_& module) {
             "A function of a dict, called after each round of density control, or None.")
         .def_property_readonly("iteration", &PyTrainer::iteration, "Iterations done.")
         .def_property_readonly("iterations", &PyTrainer::iterations, "Iterations of the whole run.")
+        .def_property_readonly(
+            "options", [](const PyTrainer& t) { return asked_options(t.request()); },
+            "A dict of every option by name, as it was asked for or by default.")
         .def("__len__", &PyTrainer::splats);
 }
 

@@ -26,6 +26,7 @@ class PyTrainer {
     SplatModel model();
     void checkpoint(const py::object& path);
 
+    const TrainRequest& request() const { return job_.request; }
     int iteration() const { return trainer_->iteration(); }
     int iterations() const { return job_.options.iterations; }
     std::uint32_t splats() const { return trainer_->splat_count(); }

@@ -86,6 +86,8 @@ TrainJob resolve(TrainRequest request, Dataset dataset, std::vector<ImageU8> pho
     check_request(request);
     TrainJob job;
     job.options = request.train;
+    job.notes = request.notes;
+    for (std::string& note : unused_options(request)) job.notes.push_back(std::move(note));
     job.resume_from = checkpoint_to_resume(request);
     job.request = std::move(request);
     job.dataset = std::move(dataset);

@@ -1,6 +1,7 @@
 // TrainRequest: everything that was asked of a training run, with nothing resolved. The command
-// line, Python, `darb compare`, `darb cost` and programs that use the library make one; resolve()
-// in trainer/job/job.h turns it into a run. A run keeps its request in OUT/request.json, from which
+// line, Python, `darb compare`, `darb cost` and programs that use the library make one, by its
+// members or by the names of options (request_options.h); resolve() in trainer/job/job.h turns it
+// into a run. A run keeps its request in OUT/request.json, from which
 // `--resume` goes on.
 #pragma once
 
@@ -47,6 +48,11 @@ struct TrainRequest {
     // Where it goes on.
     bool resume = false;  // from OUT/checkpoint.darb
     std::filesystem::path start_checkpoint;
+
+    // Of asking alone, not saved.
+    std::filesystem::path depths;    // as 3DGS spells +depth: complete_request() takes it apart
+    std::vector<std::string> given;  // options that were set by name, as "--iterations"
+    std::vector<std::string> notes;  // what readers of kernels say of them
 };
 
 /// Puts the values of the schedule "3dgs" into the options and the effects; options that are set
@@ -57,11 +63,23 @@ void use_schedule(TrainRequest& request, std::string_view schedule);
 /// and `none` say everything.
 std::string effects_beside(const std::string& first, std::string given);
 
+/// Fills in what follows from the rest, before the data set is loaded: measured depths and what
+/// leaving out lenses means for the photos, and OUT, output/NAME of the data set where none was
+/// named. A second call changes nothing. Throws Error as check_request() does, and where --depths
+/// names a folder that is not read.
+void complete_request(TrainRequest& request);
+
+/// Throws Error where no data set or no output folder is named. request: complete.
+void require_places(const TrainRequest& request);
+
 /// The checkpoint to go on from; empty: the run starts afresh.
 std::filesystem::path checkpoint_to_resume(const TrainRequest& request);
 
 /// Throws Error where two things that were asked for contradict each other.
 void check_request(const TrainRequest& request);
+
+/// What was asked for and changes nothing in this run, and why, a line for people each.
+std::vector<std::string> unused_options(const TrainRequest& request);
 
 /// As JSON, for OUT/request.json. Paths are as seen from the output folder, so that folder and
 /// photos can move together. `resume` and `output` are left out.

@@ -310,6 +310,8 @@ void refuse_without_cameras(const TrainRequest& request, int ranks) {
 
 Dataset load_training_data(TrainRequest& request, std::optional<RunLock>& lock,
                            const DataSinks& sinks) {
+    complete_request(request);
+    require_places(request);
     const bool video = is_video_name(request.dataset) && !fs::is_directory(request.dataset);
     const fs::path photos =
         video ? photos_of_video(request.dataset, request, lock, sinks)

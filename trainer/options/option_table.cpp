@@ -35,9 +35,12 @@ struct MemberOf<T TrainOptions::*> {
     using Value = typename ValueOf<T>::Type;
 };
 
-Error bad_value(const OptionRow& row, const std::string& text, const std::string& what) {
+Error bad_value(const OptionRow& row, OptionKind kind, const std::string& text,
+                const std::string& what) {
+    const std::string usual = default_text(row);
     return Error(option_name(row) + " " + text, what,
-                 fmt::format("It takes {}; default: {}.", limits_text(row), default_text(row)));
+                 fmt::format("It takes {}{}.", limits_text(row, kind),
+                             usual.empty() ? "" : "; default: " + usual));
 }
 
 /// Bytes for each unit that sizes have, powers of 1,000, with an i of 1,024.
@@ -52,60 +55,45 @@ std::optional<double> unit_bytes(std::string unit) {
     return std::pow(binary ? 1024.0 : 1000.0, static_cast<double>(power + 1));
 }
 
-double real_number(const OptionRow& row, const std::string& text) {
+double real_number(const OptionRow& row, OptionKind kind, const std::string& text) {
     char* end = nullptr;
     double number = std::strtod(text.c_str(), &end);
-    if (end == text.c_str()) throw bad_value(row, text, "is no number");
+    if (end == text.c_str()) throw bad_value(row, kind, text, "is no number");
     if (row.is_size) {
         std::string unit(end);
         unit.erase(0, unit.find_first_not_of(' '));
         const auto bytes = unit_bytes(unit);
-        if (!bytes) throw bad_value(row, text, "has no unit of bytes");
+        if (!bytes) throw bad_value(row, kind, text, "has no unit of bytes");
         number *= *bytes;
     } else if (*end != '\0') {
-        throw bad_value(row, text, "is no number");
+        throw bad_value(row, kind, text, "is no number");
     }
-    if (!std::isfinite(number)) throw bad_value(row, text, "is no finite number");
+    if (!std::isfinite(number)) throw bad_value(row, kind, text, "is no finite number");
     return number;
 }
 
 template <class T>
 T number_of(const OptionRow& row, const std::string& text) {
-    const double real = real_number(row, text);
+    const OptionKind kind = row.is_size             ? OptionKind::size
+                            : std::is_integral_v<T> ? OptionKind::whole
+                                                    : OptionKind::real;
+    const double real = real_number(row, kind, text);
     if (real < row.least || real > row.most)
-        throw bad_value(row, text, fmt::format("must be {}", limits_text(row)));
+        throw bad_value(row, kind, text, fmt::format("must be {}", limits_text(row, kind)));
     if constexpr (std::is_integral_v<T>) {
         if (row.is_size) return static_cast<T>(real);
         T whole{};
         const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), whole);
         if (error == std::errc() && end == text.data() + text.size()) return whole;
-        if (real != std::floor(real)) throw bad_value(row, text, "is no whole number");
+        if (real != std::floor(real)) throw bad_value(row, kind, text, "is no whole number");
         if (real >= static_cast<double>(std::numeric_limits<T>::max()))
-            throw bad_value(row, text, "is too large");
+            throw bad_value(row, kind, text, "is too large");
         return static_cast<T>(real);  // 1e4
     } else {
         if (std::abs(real) > double{std::numeric_limits<float>::max()})
-            throw bad_value(row, text, "is too large");
+            throw bad_value(row, kind, text, "is too large");
         return static_cast<T>(std::strtold(text.c_str(), nullptr));
     }
-}
-
-bool is_on(const OptionRow& row, const std::string& text) {
-    if (text == "on" || text == "true" || text == "1") return true;
-    if (text == "off" || text == "false" || text == "0") return false;
-    throw bad_value(row, text, "is neither on nor off");
-}
-
-bool is_whole(const OptionRow& row) {
-    return std::visit(
-        [](auto member) {
-            if constexpr (std::is_same_v<decltype(member), std::monostate>) {
-                return false;
-            } else {
-                return std::is_integral_v<typename MemberOf<decltype(member)>::Value>;
-            }
-        },
-        row.member);
 }
 
 std::string number_text(double value) {
@@ -157,16 +145,51 @@ std::string default_text(const OptionRow& row) {
     return *row.unit == '\0' ? value : fmt::format("{} {}", value, row.unit);
 }
 
-std::string limits_text(const OptionRow& row) {
-    if (std::holds_alternative<bool TrainOptions::*>(row.member)) return "on or off";
-    const char* kind = row.is_size     ? "a size as 800MB or 1.5GB,"
-                       : is_whole(row) ? "a whole number"
-                                       : "a number";
+OptionKind option_kind(const OptionRow& row) {
+    if (row.is_size) return OptionKind::size;
+    return std::visit(
+        [](auto member) {
+            if constexpr (std::is_same_v<decltype(member), std::monostate>) {
+                return OptionKind::text;
+            } else {
+                using Value = typename MemberOf<decltype(member)>::Value;
+                return std::is_same_v<Value, bool> ? OptionKind::on_off
+                       : std::is_integral_v<Value> ? OptionKind::whole
+                                                   : OptionKind::real;
+            }
+        },
+        row.member);
+}
+
+std::string limits_text(const OptionRow& row, OptionKind kind) {
+    if (kind == OptionKind::on_off) return "on or off";
+    if (kind == OptionKind::text) return "text";
+    const char* what = kind == OptionKind::size    ? "a size as 800MB or 1.5GB,"
+                       : kind == OptionKind::whole ? "a whole number"
+                                                   : "a number";
     if (row.most < 1e18)
-        return fmt::format("{} from {} to {}", kind, number_text(row.least), number_text(row.most));
+        return fmt::format("{} from {} to {}", what, number_text(row.least), number_text(row.most));
     const bool open = row.least > 0 && row.least < 1e-29;
-    return fmt::format("{} {}", kind,
+    return fmt::format("{} {}", what,
                        open ? "above 0" : fmt::format("of at least {}", number_text(row.least)));
+}
+
+std::string limits_text(const OptionRow& row) {
+    return limits_text(row, option_kind(row));
+}
+
+bool option_on(const OptionRow& row, const std::string& text) {
+    if (text == "on" || text == "true" || text == "1") return true;
+    if (text == "off" || text == "false" || text == "0") return false;
+    throw bad_value(row, OptionKind::on_off, text, "is neither on nor off");
+}
+
+int option_whole(const OptionRow& row, const std::string& text) {
+    return number_of<int>(row, text);
+}
+
+double option_real(const OptionRow& row, const std::string& text) {
+    return number_of<double>(row, text);
 }
 
 void set_option(const OptionRow& row, const std::string& text, TrainOptions& options) {
@@ -176,7 +199,7 @@ void set_option(const OptionRow& row, const std::string& text, TrainOptions& opt
             if constexpr (!std::is_same_v<Member, std::monostate>) {
                 using Value = typename MemberOf<Member>::Value;
                 if constexpr (std::is_same_v<Value, bool>)
-                    options.*member = is_on(row, text);
+                    options.*member = option_on(row, text);
                 else
                     options.*member = number_of<Value>(row, text);
             }

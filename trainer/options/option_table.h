@@ -27,8 +27,13 @@ namespace option_group {
 inline constexpr const char *kRun = "Run", *kScene = "Scene", *kPhotos = "Photos in training",
                             *kRates = "Learning rates", *kDensity = "Density control",
                             *kLimits = "Regularisers and limits of splats", *kStart = "Start",
-                            *kEffects = "Effects";
+                            *kEffects = "Effects", *kInput = "Photos and output",
+                            *kSaving = "Saving and testing", *kAccuracy = "Accuracy",
+                            *kDevice = "Device and passes";
 }
+
+/// What an option takes.
+enum class OptionKind { on_off, whole, real, size, text };
 
 struct OptionRow {
     const char* flags = "";    // with commas, dashes and all; "": presets and plans alone set it
@@ -59,8 +64,16 @@ const OptionRow& option_row(std::string_view flag);
 std::string option_name(const OptionRow& row);
 /// The default as text: a number with its unit, or the row's words.
 std::string default_text(const OptionRow& row);
-/// "from 0 to 1", "above 0", for people.
+/// By the member; text where the row has none.
+OptionKind option_kind(const OptionRow& row);
+/// "a number from 0 to 1", "a whole number of at least 0", "on or off", for people.
+std::string limits_text(const OptionRow& row, OptionKind kind);
 std::string limits_text(const OptionRow& row);
+
+/// What was typed for a row without a member, as its limits allow it. They throw as set_option().
+bool option_on(const OptionRow& row, const std::string& text);
+int option_whole(const OptionRow& row, const std::string& text);
+double option_real(const OptionRow& row, const std::string& text);
 
 /// Takes over a value as it was typed. Throws Error with the flag, the value, the reason and what
 /// it takes: no number, one that is not finite or not whole where it must be, or out of limits.

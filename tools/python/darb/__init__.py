@@ -292,7 +292,7 @@ class Trainer(_darb.Trainer):
 
     dataset: a path, or a Dataset, which brings its own resolution, eval, images and lens. Options
     have the names of `darb train --help-all` with underscores: kernel="raised_cosine",
-    max_splats=100_000, effects="-exposure", random_background=False for --no-random-background.
+    max_splats=100_000, effects="-exposure", random_background=False for --fixed-background.
     start_checkpoint=path goes on from a checkpoint, of this class or of the command.
 
     step(n=1, loss=None) -> dict: iteration, loss, psnr (dB, of the training view), splats,
@@ -307,6 +307,7 @@ class Trainer(_darb.Trainer):
         round of density control, or None.
     checkpoint(path): everything that is needed to go on bit by bit.
     iteration, iterations, len(trainer): done, in all, and the splats of now.
+    options: every option by name, as it was asked for or by default.
 
     Ctrl-C ends step() between two iterations, and the run goes on with the next call.
     """

@@ -1,7 +1,6 @@
 // The scene that a command line names: a splat file, or the output folder of a training run.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 
@@ -24,10 +23,6 @@ std::filesystem::path scene_of_run(const std::filesystem::path& output);
 /// load_splats of find_scene(path), with a warning on stderr for what was dropped or left out.
 SplatModel load_scene(const std::filesystem::path& path, SplatFile* facts = nullptr,
                       const StoredUnits& units = {});
-
-/// --scales, --opacities, --colours, --rotations and --harmonics: how the file stores its splats.
-/// with_scales: false where the command has another option --scales, which takes its words, too.
-void add_unit_options(CLI::App& command, StoredUnits& units, bool with_scales = true);
 
 /// Holds out what the command line says, else what the run did that wrote the scene, its output
 /// folder or a file in it, else every eighth view; an arc is noted.

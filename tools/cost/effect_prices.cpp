@@ -1,4 +1,4 @@
-#include "tools/darb/plan_price.h"
+#include "tools/cost/effect_prices.h"
 
 #include <fmt/format.h>
 
@@ -7,10 +7,10 @@
 #include <cmath>
 
 #include "engine/core/say.h"
+#include "engine/plan/tuner.h"
 #include "engine/render/renderer.h"
-#include "tools/darb/effect_flags.h"
-#include "tools/darb/tune_flags.h"
 #include "trainer/growth/initial_model.h"
+#include "trainer/job/job.h"
 #include "trainer/step/trainer.h"
 
 namespace darb {

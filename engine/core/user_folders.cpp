@@ -1,4 +1,4 @@
-#include "tools/darb/user_folders.h"
+#include "engine/core/user_folders.h"
 
 #include <cstdlib>
 

@@ -1,9 +1,9 @@
-#include "tools/darb/device_options.h"
+#include "engine/gpu/device_environment.h"
 
 #include <cstdlib>
 #include <string_view>
 
-#include "tools/darb/user_folders.h"
+#include "engine/core/user_folders.h"
 
 namespace darb {
 

@@ -1,0 +1,104 @@
+#include "tools/cost/plan_subject.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "engine/core/error.h"
+#include "engine/core/say.h"
+#include "engine/data/camera_list.h"
+#include "engine/gpu/device_environment.h"
+#include "tools/cost/views.h"
+#include "trainer/job/scene_file.h"
+
+namespace darb {
+
+namespace {
+
+bool distorted(const Dataset& dataset) {
+    return std::ranges::any_of(dataset.views, [](const View& v) { return v.lens.distorted(); });
+}
+
+// As loaded, photos may have been straightened.
+Dataset through_the_lens(const PlanRequest& request) {
+    DatasetOptions original = request.data;
+    original.original_lens = true;
+    return load_dataset(request.what, original);
+}
+
+}  // namespace
+
+PlanSubject open_subject(const PlanRequest& request) {
+    PlanSubject s;
+    s.training = !is_scene(request.what);
+    const auto refuse = [&](bool given, const char* flag) {
+        if (given)
+            throw Error(fmt::format("darb plan {} {}", request.what.string(), flag),
+                        s.training ? "is for a scene, and this is a data set"
+                                   : "is for a data set, and this is a scene",
+                        "Leave it out.");
+    };
+    if (s.training) {
+        refuse(request.depth, "--depth");
+        refuse(!request.cameras.empty(), "--cameras");
+        s.dataset = load_dataset(request.what, request.data);
+        say_notes(s.dataset.notes);
+        if (!s.dataset.points.seen_begin.empty() || s.dataset.has_alpha)
+            s.photos = load_photos(s.dataset.views);
+        return s;
+    }
+    refuse(request.sh_degree.has_value(), "--sh-degree");
+    refuse(request.kernel.has_value(), "--kernel");
+    s.model = load_scene(request.what, nullptr, request.units);
+    if (request.cameras.empty()) return s;
+    std::vector<std::string> notes;
+    s.views = load_cameras(request.cameras, request.data, &notes);
+    say_notes(notes);
+    return s;
+}
+
+int degree_of(const PlanSubject& s, const PlanRequest& request) {
+    return s.training ? request.sh_degree.value_or(TrainOptions{}.sh_degree) : s.model.sh_degree;
+}
+
+EffectPlan plan_of(const PlanSubject& s, const PlanRequest& request, const EffectChoice& choice) {
+    return s.training ? plan_training(s.dataset, s.photos, degree_of(s, request), choice)
+                      : plan_rendering(s.model, s.views, {.depth = request.depth}, choice);
+}
+
+std::vector<int> switchable_effects(const PlanSubject& s, const PlanRequest& request) {
+    const std::vector<int> impossible =
+        impossible_effects(s.training ? EffectUse::training : EffectUse::pictures);
+    const auto has = [&](int effect) {
+        if (effect == EFFECT_VIEW_COLOUR) return degree_of(s, request) > 0;
+        if (effect == EFFECT_DEPTH && s.training)
+            return std::ranges::any_of(s.dataset.views,
+                                       [](const View& view) { return !view.depth.empty(); });
+        if (effect == EFFECT_LENS) return !s.training || distorted(s.dataset);
+        return std::find(impossible.begin(), impossible.end(), effect) == impossible.end();
+    };
+    std::vector<int> effects;
+    for (int e = 0; e < EFFECT_COUNT; ++e)
+        if (has(e)) effects.push_back(e);
+    return effects;
+}
+
+Dataset planned_dataset(const PlanSubject& s, const PlanRequest& request, const EffectPlan& plan) {
+    return plan.on(EFFECT_LENS) && distorted(s.dataset) ? through_the_lens(request) : s.dataset;
+}
+
+Measured measure_subject(const PlanSubject& s, const PlanRequest& request, const EffectPlan& plan) {
+    DeviceOptions device = command_device(request.device);
+    if (s.training) {
+        TrainOptions train;
+        train.kernel = request.kernel.value_or(train.kernel);
+        return measure_training(device, planned_dataset(s, request, plan), train, plan);
+    }
+    std::vector<View> views = s.views;
+    if (views.empty())
+        for (const Camera& camera : orbit_views(s.model, 4, 640, 480).cameras)
+            views.emplace_back().camera = camera;
+    return measure_rendering(device, s.model, views, plan);
+}
+
+}  // namespace darb

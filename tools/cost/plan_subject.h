@@ -1,0 +1,49 @@
+// What a plan is made for: a data set to train on or a scene to render, with its plan and what
+// frames or iterations of it cost.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "engine/plan/effect_plan.h"
+#include "engine/scene/splat_model.h"
+#include "engine/scene/stored_units.h"
+#include "tools/cost/effect_prices.h"
+
+namespace darb {
+
+struct PlanRequest {
+    std::filesystem::path what;     // a data set, a scene, or the output folder of a run
+    std::filesystem::path cameras;  // of a scene: those that it will be rendered through
+    std::string device, effects = "auto";
+    bool depth = false;            // of a scene: depth images are wanted, too
+    std::optional<int> sh_degree;  // of a data set, as is the kernel
+    std::optional<int> kernel;
+    DatasetOptions data;
+    StoredUnits units;  // of a scene
+};
+
+struct PlanSubject {
+    bool training = false;
+    SplatModel model;  // of a scene, as are the views of its cameras
+    std::vector<View> views;
+    Dataset dataset;  // of training
+    std::vector<ImageU8> photos;
+};
+
+/// Throws Error where the path cannot be read or an option is for the other kind; notes of the
+/// readers are said.
+PlanSubject open_subject(const PlanRequest& request);
+int degree_of(const PlanSubject& s, const PlanRequest& request);
+EffectPlan plan_of(const PlanSubject& s, const PlanRequest& request, const EffectChoice& choice);
+/// Those of EFFECT_COUNT that can be on or off for this subject.
+std::vector<int> switchable_effects(const PlanSubject& s, const PlanRequest& request);
+/// The data set as a run under this plan sees it: through the lenses where the plan has them.
+Dataset planned_dataset(const PlanSubject& s, const PlanRequest& request, const EffectPlan& plan);
+/// On the device of the request; a scene without cameras is looked at from around it.
+Measured measure_subject(const PlanSubject& s, const PlanRequest& request, const EffectPlan& plan);
+
+}  // namespace darb
