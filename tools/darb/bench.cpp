@@ -1,31 +1,62 @@
 // darb bench [FILTER]: how long frames, training steps, sorts and starts take on this device, what
 // they work on, and how near that is to what the device can do.
-
 #include <fmt/format.h>
-
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <regex>
+#include <string>
+#include <vector>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/core/say.h"
+#include "engine/gpu/device.h"
 #include "engine/gpu/device_environment.h"
 #include "engine/plan/effect_plan.h"
 #include "tools/bench/bench_report.h"
 #include "tools/bench/cases.h"
+#include "tools/bench/growth.h"
 #include "tools/bench/scenes.h"
-#include "tools/darb/bench_choice.h"
-#include "tools/darb/bench_growth.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/devices.h"
-#include "tools/darb/json_output.h"
-#include "tools/darb/numbers.h"
+#include "tools/darb/flags.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
 #include "trainer/job/job.h"
+#include "trainer/job/scene_file.h"
 
 namespace darb {
+
+/// what: a scene of one's own, measured with the photos of `dataset` where one is named; else a
+/// regular expression on the names of the cases, "": all. Throws Error where nothing fits.
+std::vector<BenchCase> chosen_cases(const std::string& what, const std::filesystem::path& dataset,
+                                    bool full);
+
+/// Those whose scenes are there; a line on stderr for each of the others.
+std::vector<BenchCase> possible_cases(std::vector<BenchCase> cases, const BenchOptions& options);
+
+// darb bench --growth.
+
+struct GrowthFlags {
+    bool on = false;
+    GrowthPlan plan;
+    std::filesystem::path html;
+};
+
+/// Adds --growth and what goes with it.
+void add_growth_flags(CLI::App& command, GrowthFlags& flags);
+
+/// Measures, prints the table and writes the files that are named.
+/// Throws Error where the flags contradict each other. filter: of the cases.
+void check_growth(const GrowthFlags& flags, const std::string& filter);
+
+void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,
+                  const std::filesystem::path& json, bool quiet,
+                  const std::function<void(const std::string&)>& progress);
 
 namespace {
 
@@ -119,6 +150,67 @@ void add_bench(CLI::App& app, Action& action) {
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
     command->callback([flags, &action] { action = [flags] { return bench(*flags); }; });
+}
+
+std::vector<BenchCase> chosen_cases(const std::string& what, const std::filesystem::path& dataset,
+                                    bool full) {
+    std::error_code none;
+    if (!what.empty() && std::filesystem::exists(what, none))
+        return own_cases(find_scene(what), dataset);
+    if (!dataset.empty())
+        throw Error(what, "is no scene", "Name a splat file: darb bench SCENE DATASET.");
+    std::vector<BenchCase> cases = bench_cases(full);
+    try {
+        const std::regex filter(what);
+        std::erase_if(cases,
+                      [&](const BenchCase& one) { return !std::regex_search(one.name, filter); });
+    } catch (const std::regex_error& e) {
+        throw Error("darb bench " + what, fmt::format("is no regular expression: {}", e.what()),
+                    "Use part of a name; darb bench --list shows them.");
+    }
+    if (cases.empty())
+        throw Error("darb bench " + what, "fits no case",
+                    "darb bench --list shows them; a scene of your own is a file.");
+    return cases;
+}
+
+std::vector<BenchCase> possible_cases(std::vector<BenchCase> cases, const BenchOptions& options) {
+    std::error_code error;
+    std::erase_if(cases, [&](const BenchCase& one) {
+        if (one.file.empty()) return false;
+        if (options.data && std::filesystem::exists(*options.data / one.file, error)) return false;
+        say("warning: {} is left out: no {}; name its folder with --data\n", one.name,
+            ((options.data ? *options.data : "DATA") / one.file).string());
+        return true;
+    });
+    return cases;
+}
+
+void add_growth_flags(CLI::App& command, GrowthFlags& flags) {
+    command.add_flag(
+        "--growth", flags.on,
+        "time against splats, pixels and intersections instead, with fitted exponents");
+    command.add_option("--most-splats", flags.plan.most_splats, "of --growth")
+        ->capture_default_str()
+        ->check(CLI::Range(1'000u, 100'000'000u));
+    command.add_option("--html", flags.html, "write the plots of --growth to this page");
+}
+
+void check_growth(const GrowthFlags& flags, const std::string& filter) {
+    if (flags.on && !filter.empty())
+        throw Error("darb bench --growth " + filter, "--growth measures no cases",
+                    "Leave one of them out.");
+    if (!flags.on && !flags.html.empty())
+        throw Error("darb bench --html", "the page is that of --growth", "Add --growth.");
+}
+
+void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,
+                  const std::filesystem::path& json, bool quiet,
+                  const std::function<void(const std::string&)>& progress) {
+    const std::vector<GrowthCurve> curves = measure_growth(device, flags.plan, progress);
+    write_json(json, {{"context", context}, {"growth", growth_json(curves)}});
+    if (!flags.html.empty()) write_file_atomic(flags.html, growth_html(curves, context));
+    tell(stream_beside_json(json, quiet), "{}", growth_table(curves));
 }
 
 }  // namespace darb

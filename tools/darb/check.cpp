@@ -15,12 +15,10 @@
 #include "engine/core/text.h"
 #include "engine/gpu/device_environment.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/json_output.h"
-#include "tools/darb/kernel_flags.h"
+#include "tools/darb/flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
-#include "tools/darb/unit_flags.h"
 #include "trainer/job/scene_file.h"
 
 namespace darb {

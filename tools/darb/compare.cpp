@@ -1,31 +1,82 @@
 // darb compare DATASET... -o OUT: kernels side by side, trained or found, as the paper's tables.
+#include "tools/darb/compare.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
+#include "engine/data/camera_list.h"
+#include "engine/data/dataset.h"
 #include "engine/data/run_colmap.h"
 #include "engine/gpu/device.h"
 #include "engine/gpu/device_environment.h"
+#include "engine/kernels/kernel_family.h"
+#include "engine/plan/tuner.h"
 #include "engine/ranks/ranks.h"
+#include "engine/scene/splat_file.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/compare_flags.h"
-#include "tools/darb/json_output.h"
+#include "tools/darb/flags.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/scene_evaluation.h"
 #include "tools/darb/stop_signals.h"
+#include "tools/darb/train_flags.h"
+#include "tools/darb/train_plan.h"
+#include "tools/paper/compare_measure.h"
+#include "tools/paper/compare_share.h"
+#include "tools/paper/compare_stats.h"
+#include "trainer/job/job.h"
 #include "trainer/job/training_data.h"
+#include "trainer/options/strategy.h"
 #include "trainer/run/run_folder.h"
+#include "trainer/step/checkpoint.h"
 #include "trainer/step/rank_group.h"
 
 namespace darb {
+
+/// A run's failure, unless it was interrupted, and its notes, for people; -q hides the notes.
+void say_what_went_wrong(const ComparedRun& run);
+
+/// Of one data set.
+class RunMeasurer {
+  public:
+    /// path: of the data set. Throws Error where a photo is too small for one of flags.scales.
+    /// lpips may be null.
+    RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
+                const Dataset& dataset, const TrainRequest& first, const Lpips* lpips);
+
+    // Of runs that came to their end. What fails here becomes a note and leaves the run as it is.
+
+    /// All but blending.
+    void measure(ComparedRun& run);
+    /// Of each kernel's first run that came to its end: on one device, as times are compared.
+    void measure_blending(std::vector<ComparedRun>& runs, const std::vector<View>& held_out) const;
+    /// What is measured, in words: ranks that differ in it would give numbers to some runs alone.
+    std::string measurements() const;
+
+  private:
+    void on_device(ComparedRun& run, const char* what,
+                   const std::function<void(Device&)>& measurement) const;
+    void measure_models(ComparedRun& run, Device& device) const;
+
+    const CompareFlags& flags_;
+    ViewLpips lpips_;
+    std::vector<std::vector<View>> scaled_;  // [scale]
+    SceneEvaluation options_;
+    Dataset off_path_;
+    std::string lpips_name_;
+};
 
 namespace {
 
@@ -141,6 +192,391 @@ void add_compare(CLI::App& app, Action& action) {
             });
         };
     });
+}
+
+// What the runs of a comparison have in common, as its files say it: no folder of the machine.
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> paths_in_options(const CompareFlags& flags) {
+    std::vector<std::string> words = CLI::detail::split_up(flags.train_options);
+    words.insert(words.end(), flags.forwarded.begin(), flags.forwarded.end());
+    std::vector<fs::path> paths;
+    std::error_code none;
+    for (const std::string& word : words) {
+        const fs::path value = word.starts_with('-') ? word.substr(word.find('=') + 1) : word;
+        if (value.is_absolute() || (value.has_parent_path() && fs::exists(value, none)))
+            paths.push_back(value);
+    }
+    return paths;
+}
+
+std::string settings_of(const CompareFlags& flags) {
+    std::string words;
+    for (const std::string& word : flags.forwarded) words += " " + word;
+    if (!flags.train_options.empty()) words += " " + flags.train_options;
+    for (const fs::path& path : paths_in_options(flags))
+        if (const auto at = words.find(path.string()); at != std::string::npos)
+            words.replace(at, path.string().size(), shared_name(flags.output, path));
+    const std::string growth =
+        flags.max_splats > 0
+            ? fmt::format("Growth stops at {} splats.", flags.max_splats)
+            : "Equal densification threshold, so each kernel has its own number of splats.";
+    return fmt::format("{} Options of training:{}.", growth,
+                       words.empty() ? " the defaults" : words);
+}
+
+void leave_folders_out(ComparedDataset& dataset, const CompareFlags& flags) {
+    std::vector<std::filesystem::path> paths = paths_in_options(flags);
+    paths.insert(paths.end(), {dataset_path(dataset.path.string()), flags.output});
+    for (ComparedRun& run : dataset.runs)
+        for (std::string* text : {&run.failure, &run.notes})
+            for (const std::filesystem::path& path : paths) *text = without_folders(*text, path);
+}
+
+void check_same_runs(Ranks& ranks, const CompareFlags& flags, const std::string& dataset,
+                     const std::vector<int>& kernels, const std::string& fingerprint,
+                     const std::string& measurements) {
+    if (ranks.count() == 1) return;
+    std::string runs = fmt::format("with seeds {}, kernels", flags.seeds);
+    for (const int kernel : kernels) runs += fmt::format(" {}", kernel_name(kernel));
+    RankFacts facts = rank_facts();
+    facts.emplace_back("data set", fingerprint.empty() ? "unread" : fingerprint);
+    facts.emplace_back("runs", runs);
+    facts.emplace_back("measurements", measurements);
+    facts.emplace_back("settings",
+                       settings_text(train_request_of(flags, dataset, kernels.front(), 0).train));
+    check_same(ranks, facts);
+}
+
+std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
+    note = "LPIPS was left out: no weights were given (--lpips FILE).";
+    for (const auto& file : flags.lpips)
+        if (!std::filesystem::exists(file)) {
+            constexpr const char* left_out = "LPIPS was left out: {} does not exist.";
+            note = fmt::format(left_out, file.filename().string());
+            say("warning: {}\n", fmt::format(left_out, file.string()));
+            return std::nullopt;
+        }
+    if (flags.lpips.empty()) return std::nullopt;
+    std::optional<Lpips> lpips(std::in_place, flags.lpips, LpipsOptions{flags.lpips_as_3dgs, 0});
+    note = fmt::format("LPIPS: {}, colours from {} to 1{}.", lpips->net_name(),
+                       flags.lpips_as_3dgs ? "0" : "-1",
+                       flags.lpips_as_3dgs ? " as in the evaluation of 3DGS" : "");
+    return lpips;
+}
+
+// The training runs of a comparison, through the code of `darb train`.
+
+namespace {
+
+/// One data set with what its runs share.
+class Comparer {
+  public:
+    Comparer(const CompareFlags& flags, const std::string& name, int kernel, const Lpips* lpips)
+        : flags_(flags), name_(name) {
+        TrainRequest first = train_request_of(flags, name, kernel, 0);
+        std::optional<RunLock> lock;  // while COLMAP writes
+        dataset_ = load_training_data(first, lock, {flags.quiet, &stop_on_signals()});
+        say_notes(dataset_.notes);
+        if (held_out().empty())
+            throw Error(name, "holds no view out", "Give it more photos, or a list of test views.");
+        photos_ = load_photos(dataset_.views);
+        measurer_.emplace(flags, dataset_path(name), dataset_, first, lpips);
+    }
+
+    const std::vector<View>& views() const { return dataset_.views; }
+    std::string fingerprint() const { return dataset_fingerprint(dataset_, photos_); }
+    RunMeasurer& measurer() { return *measurer_; }
+    std::vector<View> held_out() const { return held_out_views(dataset_.views); }
+    /// Of all runs, by seed and then kernel, those of this rank; up to the stop.
+    std::vector<ComparedRun> runs(const std::vector<int>& kernels, const Ranks& ranks,
+                                  const std::atomic<bool>& stop);
+
+  private:
+    ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
+    void train(TrainJob& job, const std::atomic<bool>& stop);
+
+    const CompareFlags& flags_;
+    std::string name_;
+    Dataset dataset_;
+    std::vector<ImageU8> photos_;
+    std::optional<RunMeasurer> measurer_;
+};
+
+void Comparer::train(TrainJob& job, const std::atomic<bool>& stop) {
+    job = resolve(job.request, dataset_, photos_);
+    const TrainRequest& request = job.request;
+    for (const std::string& note : job.notes) say_note("note: " + note);
+    const TrainOptions& options = job.options;
+    const RunState state =
+        run_state(request.output, settings_text(options), format_camera_list(job.dataset.views),
+                  options.iterations, held_out().size(), hold_out_text(request.data.held_out));
+    const std::string title = fmt::format("{}: {}, seed {}", dataset_name(name_),
+                                          kernel_name(options.kernel), options.seed);
+    if (state == RunState::finished) return say_note(title + ": is there");
+    if (state == RunState::partial) job.resume_from = request.output / "checkpoint.darb";
+    say_note(title);
+    const RunLock lock(request.output);
+    Device device(
+        command_device(flags_.device));  // of its own, so that the peak of memory is this run's
+    settle_tuning(device);
+    find_start(device, job, say_stereo_begins);
+    darb::run(device, job, {.quiet = flags_.quiet, .stop = &stop});
+}
+
+std::vector<ComparedRun> Comparer::runs(const std::vector<int>& kernels, const Ranks& ranks,
+                                        const std::atomic<bool>& stop) {
+    std::vector<ComparedRun> done;
+    for (int seed = 0, item = 0; seed < flags_.seeds; ++seed)
+        for (const int kernel : kernels)
+            if (has_turn(ranks, std::size_t(item++)) && !stop)
+                done.push_back(run(kernel, static_cast<std::uint64_t>(seed), stop));
+    return done;
+}
+
+ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop) {
+    const TrainRequest request = train_request_of(flags_, name_, kernel, seed);
+    ComparedRun run;
+    run.kernel = kernel_name(kernel);
+    run.seed = seed;
+    run.folder = request.output;
+    TrainJob job{.request = request, .options = request.train};
+    job.dataset.views = dataset_.views;
+    try {
+        train(job, stop);
+        if (stop) run.failure = "interrupted; the same command goes on with it";
+        if (!stop) read_run(run, flags_.iterations);
+    } catch (const std::exception& e) {
+        run.failure = e.what();
+        count_exception(e, run);
+    }
+    if (run.failure.empty())
+        measurer_->measure(run);
+    else
+        read_unfinished_run(run, flags_.iterations, settings_text(job.options),
+                            format_camera_list(job.dataset.views));
+    say_what_went_wrong(run);
+    return run;
+}
+
+}  // namespace
+
+ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset,
+                           const std::vector<int>& kernels, const Lpips* lpips, Ranks& ranks,
+                           const std::atomic<bool>& stop) {
+    ComparedDataset result{dataset_name(dataset), dataset, {}};
+    std::optional<Comparer> comparer;
+    try {
+        comparer.emplace(flags, dataset, kernels.front(), lpips);
+    } catch (const Error& e) {
+        check_same_runs(ranks, flags, dataset, kernels, "", "");
+        ComparedRun& failed = result.runs.emplace_back();
+        failed.kernel = "every kernel";
+        failed.failure = e.what();
+        failed.exit_code = 2;
+        say_what_went_wrong(failed);
+        return result;
+    }
+    check_same_runs(ranks, flags, dataset, kernels, comparer->fingerprint(),
+                    comparer->measurer().measurements());
+    refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(comparer->views()));
+    const std::vector<ComparedRun> own = comparer->runs(kernels, ranks, stop);
+    result.runs = runs_of_all(ranks, own, kernels.size() * static_cast<std::size_t>(flags.seeds));
+    for (const ComparedRun& run : result.runs)
+        if (std::none_of(own.begin(), own.end(),
+                         [&](const ComparedRun& its) { return its.folder == run.folder; }))
+            say_what_went_wrong(run);
+    if (ranks.is_first() && !stop)
+        comparer->measurer().measure_blending(result.runs, comparer->held_out());
+    return result;
+}
+
+// The command line of `darb compare`, and that of each of its runs.
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// An option that goes to `darb train` as it is.
+void forward(CLI::App& command, CompareFlags& flags, const std::string& names,
+             const std::string& word, const std::string& help) {
+    command.add_option_function<std::string>(
+        names,
+        [&flags, word](const std::string& value) { flags.forwarded.push_back(word + "=" + value); },
+        help);
+}
+
+}  // namespace
+
+void add_compare_flags(CLI::App& command, CompareFlags& flags) {
+    command.add_option("datasets", flags.datasets,
+                       "as darb train takes them; PATH@images_4 for its own photo folder");
+    command.add_option("-o,--output", flags.output,
+                       "folder of the runs, OUT/DATASET/KERNEL/seedN: finished ones are kept");
+    command
+        .add_option("--kernels", flags.kernels,
+                    "paper (its five), all (nine), or names and expressions with commas")
+        ->capture_default_str();
+    add_kernel_file_flag(command, flags.kernel_files);
+    command
+        .add_option("--pulses", flags.pulses,
+                    "of raised_cosine and sinc, with commas: 1,2,3 tests what rings cost and gain")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->capture_default_str()
+        ->check(CLI::Range(1, KERNEL_MAX_PULSES));
+    command.add_option("--iterations", flags.iterations, "evaluate after these, with commas")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->capture_default_str()
+        ->check(CLI::Range(1, 10'000'000));
+    command.add_option("--seeds", flags.seeds, "runs of each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100));
+    command.add_option("--max-splats", flags.max_splats, "growth stops there: equal count")
+        ->check(above_zero());
+    forward(command, flags, "-r,--resolution", "--resolution", "as in darb train");
+    add_scales_flag(command, flags.scales);
+    forward(command, flags, "--hold-out", "--hold-out", "as in darb train");
+    forward(command, flags, "-i,--images", "--images", "as in darb train");
+    forward(command, flags, "--effects", "--effects", "as in darb train");
+    forward(command, flags, "--footprint", "--footprint", "psi or exact");
+    forward(command, flags, "--strategy", "--strategy", strategy_names());
+    command.add_option("--train-options", flags.train_options,
+                       "more options of darb train, as one word in quotes");
+    command
+        .add_option("--lpips", flags.lpips,
+                    "safetensors with the weights of AlexNet or VGG16 and of LPIPS's layers; once "
+                    "for each file")
+        ->allow_extra_args(false);
+    command.add_flag("--lpips-as-3dgs", flags.lpips_as_3dgs,
+                     "colours from 0 to 1 into LPIPS, as published numbers of splats have it");
+    command.add_option("--blending-views", flags.blending_views, "to count and time; 0: none")
+        ->capture_default_str()
+        ->check(zero_or_more());
+    command.add_option("--html", flags.html, "default OUT/compare.html");
+    command.add_option("--json", flags.json, "default OUT/compare.json; - is stdout");
+    command.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
+    add_quiet_flag(command, flags.quiet);
+}
+
+std::vector<int> kernels_of(const CompareFlags& flags) {
+    std::vector<int> rows;
+    for (const int kernel : kernels_from_list("--kernels", flags.kernels, flags.kernel_files))
+        for (const int pulses : flags.pulses)
+            if (const auto row = kernel_with_pulses(kernel, pulses);
+                row && std::find(rows.begin(), rows.end(), *row) == rows.end())
+                rows.push_back(*row);
+    if (rows.empty())
+        throw Error("--pulses", "none of the kernels has so many",
+                    "raised_cosine and sinc have 1 to 3 pulses, the others one.");
+    return rows;
+}
+
+std::string dataset_path(const std::string& dataset) {
+    return fs::exists(dataset) ? dataset : dataset.substr(0, dataset.rfind('@'));
+}
+
+std::string dataset_name(const std::string& dataset) {
+    const auto path = fs::absolute(dataset_path(dataset)).lexically_normal();
+    return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
+TrainRequest train_request_of(const CompareFlags& flags, const std::string& dataset, int kernel,
+                              std::uint64_t seed) {
+    const std::string name(kernel_name(kernel)), path = dataset_path(dataset);
+    const auto folder = flags.output / dataset_name(dataset) / name / fmt::format("seed{}", seed);
+    std::vector<std::string> words{path, "-o", folder.string(), "--eval"};
+    words.push_back("--kernel=" + std::string(kernel_name(*kernel_with_pulses(kernel, 1))));
+    words.push_back(fmt::format("--pulses={}", kernel_pulses(kernel)));
+    words.push_back(fmt::format("--seed={}", seed));
+    words.push_back(fmt::format("--iterations={}", flags.iterations.back()));
+    for (const char* list : {"--test-iterations", "--save-iterations"}) {
+        words.push_back(list);
+        for (const int i : flags.iterations) words.push_back(std::to_string(i));
+    }
+    const bool own_images = path.size() < dataset.size();
+    if (own_images) words.push_back("--images=" + dataset.substr(path.size() + 1));
+    for (const std::string& word : flags.forwarded)
+        if (!own_images || !word.starts_with("--images=")) words.push_back(word);
+    return parse_train_words(std::move(words), flags.train_options, "darb compare");
+}
+
+void say_what_went_wrong(const ComparedRun& run) {
+    if (run.exit_code != 0 && !run.failure.empty()) say("failed: {}\n", run.failure);
+    if (!run.notes.empty()) say_note("note: " + run.notes);
+}
+
+RunMeasurer::RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
+                         const Dataset& dataset, const TrainRequest& first, const Lpips* lpips)
+    : flags_(flags),
+      lpips_(lpips),
+      off_path_(off_path_of(path, dataset.options)),
+      lpips_name_(lpips ? lpips->net_name() : "none") {
+    for (const double scale : flags.scales)
+        scaled_.push_back(scaled_views(held_out_views(dataset.views), scale));
+    options_.background = glm::vec3(first.train.white_background ? 1.0f : 0.0f);
+    options_.effects = parse_effects(first.effects);  // as it trains, so it is measured
+    options_.alpha_is_mask = dataset.alpha_is_mask;
+}
+
+void RunMeasurer::measure_models(ComparedRun& run, Device& device) const {
+    for (ComparedAt& at : run.at) {
+        if (at.model.empty()) continue;
+        const SplatModel model = load_splats(at.model);
+        for (std::size_t i = 0; i < scaled_.size(); ++i) {
+            const Evaluation e = evaluate_scene(device, model, scaled_[i], options_);
+            at.scales.push_back({flags_.scales[i], e.psnr_db, e.ssim});
+        }
+        if (off_path_.views.empty()) continue;
+        SceneEvaluation options = options_;
+        options.alpha_is_mask = off_path_.alpha_is_mask;
+        at.off_path_db =
+            evaluate_scene(device, model, held_out_views(off_path_.views), options).psnr_db;
+    }
+}
+
+void RunMeasurer::on_device(ComparedRun& run, const char* what,
+                            const std::function<void(Device&)>& measurement) const {
+    attempt(run, what, [&] {
+        DeviceOptions options = command_device(flags_.device);
+        Device device(options);
+        settle_tuning(device);
+        measurement(device);
+    });
+}
+
+void RunMeasurer::measure(ComparedRun& run) {
+    attempt(run, "LPIPS", [&] { lpips_.measure(run); });
+    attempt(run, "learned shapes", [&] { read_shapes_of(run); });
+    if (!scaled_.empty() || !off_path_.views.empty())
+        on_device(run, "other sizes and views off the path",
+                  [&](Device& device) { measure_models(run, device); });
+}
+
+void RunMeasurer::measure_blending(std::vector<ComparedRun>& runs,
+                                   const std::vector<View>& held_out) const {
+    if (flags_.blending_views == 0) return;
+    std::vector<Camera> cameras;
+    for (const View& view : held_out) cameras.push_back(view.camera);
+    std::set<std::string> done;  // kernels
+    for (ComparedRun& run : runs) {
+        if (!run.failure.empty() || done.contains(run.kernel)) continue;
+        const std::string before = run.notes;
+        on_device(run, "blending", [&](Device& device) {
+            measure_blending_of(run, device, cameras, flags_.blending_views);
+            done.insert(run.kernel);
+        });
+        if (run.notes != before) say_note("note: " + run.notes.substr(before.size()));
+    }
+}
+
+std::string RunMeasurer::measurements() const {
+    std::string text =
+        fmt::format("LPIPS {}, {} views off the path, sizes", lpips_name_, off_path_.views.size());
+    for (const double scale : flags_.scales) text += fmt::format(" {}", scale);
+    return text;
 }
 
 }  // namespace darb

@@ -10,7 +10,6 @@
 #include "engine/ranks/ranks.h"
 #include "tools/bench/bench_step.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
 

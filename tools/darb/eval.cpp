@@ -1,31 +1,64 @@
 // darb eval SCENE.ply DATASET: PSNR and SSIM of the scene's pictures against the photos.
-
 #include <fmt/format.h>
-
+#include <algorithm>
 #include <charconv>
+#include <cstdio>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
 #include "engine/gpu/device_environment.h"
 #include "engine/plan/effect_plan.h"
-#include "tools/darb/accuracy_flags.h"
+#include "engine/render/light_share.h"
+#include "engine/scene/splat_model.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/effect_flags.h"
-#include "tools/darb/eval_light.h"
-#include "tools/darb/evaluation_flags.h"
-#include "tools/darb/json_output.h"
+#include "tools/darb/flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_evaluation.h"
-#include "tools/darb/trained_cameras.h"
 #include "tools/darb/tune_flags.h"
-#include "tools/darb/unit_flags.h"
 #include "trainer/job/scene_file.h"
 
 namespace darb {
+
+constexpr std::uint32_t kFewViews = 3;  // fewer are few
+
+struct LightOfView {
+    std::string name;
+    double share = 0;  // 0 to 1
+};
+
+struct LightReport {
+    std::size_t few = 0, splats = 0;  // few: of the splats, those that few training views see
+    std::vector<LightOfView> views;
+    std::optional<double> mean, arc, off_path;  // arc: where other views are there, mean is of them
+};
+
+/// all: of the data set; those that are not held out see the splats. views: to measure, as are
+/// off_path, which may be empty. At the size that the views have, with the default accuracy.
+LightReport measure_light(Device& device, const SplatModel& model, const EffectChoice& effects,
+                          const std::vector<View>& all, const std::vector<View>& views,
+                          const std::vector<View>& off_path);
+
+/// Prints it; returns the same as JSON.
+nlohmann::json told_light(std::FILE* out, const LightReport& light);
+
+// The cameras that a run ended with, where it refined them.
+
+/// Of views of the same name, at these views' sizes, from the cameras.json of the scene's run; a
+/// note says so. Nothing happens where the run refined none. Throws Error where the file is not
+/// what a run leaves.
+void take_trained_cameras(const std::filesystem::path& scene, std::vector<View>& views);
 
 namespace {
 
@@ -182,6 +215,108 @@ void add_eval(CLI::App& app, Action& action) {
     command->callback([flags, &action] {
         action = [flags] { return with_ranks([&](Ranks& ranks) { return eval(ranks, *flags); }); };
     });
+}
+
+namespace {
+
+std::vector<Camera> cameras_of(std::vector<View> views, const EffectPlan& plan) {
+    apply_plan(plan, views);
+    std::vector<Camera> cameras;
+    for (const View& view : views) cameras.push_back(view.camera);
+    return cameras;
+}
+
+std::optional<double> mean_of(const std::vector<double>& shares) {
+    if (shares.empty()) return std::nullopt;
+    double sum = 0;
+    for (const double share : shares) sum += share;
+    return sum / double(shares.size());
+}
+
+}  // namespace
+
+LightReport measure_light(Device& device, const SplatModel& model, const EffectChoice& effects,
+                          const std::vector<View>& all, const std::vector<View>& views,
+                          const std::vector<View>& off_path) {
+    SplatModel planned = model;
+    const EffectPlan plan = plan_rendering(planned, views, {}, effects);
+    apply_plan(plan, planned);
+    std::vector<View> training = all;
+    std::erase_if(training, [](const View& view) { return view.is_test; });
+    const std::vector<std::uint32_t> seen =
+        views_that_see(device, planned, cameras_of(training, plan));
+    std::vector<std::uint8_t> few;
+    for (const std::uint32_t count : seen) few.push_back(count < kFewViews ? 1 : 0);
+    LightReport light;
+    light.splats = few.size();
+    light.few = static_cast<std::size_t>(std::count(few.begin(), few.end(), 1));
+    std::vector<double> in_arc, others;
+    const std::vector<double> shares = light_shares(device, planned, few, cameras_of(views, plan));
+    for (std::size_t v = 0; v < views.size(); ++v) {
+        light.views.push_back({views[v].name, shares[v]});
+        (views[v].in_arc ? in_arc : others).push_back(shares[v]);
+    }
+    light.mean = mean_of(others.empty() ? in_arc : others);
+    if (!others.empty()) light.arc = mean_of(in_arc);
+    light.off_path = mean_of(light_shares(device, planned, few, cameras_of(off_path, plan)));
+    return light;
+}
+
+namespace {
+
+void print_light(std::FILE* out, const LightReport& light) {
+    const auto percent = [](const char* what, const std::optional<double>& share) {
+        return share ? fmt::format("{}{:.2f} %", what, 100 * *share) : std::string();
+    };
+    tell(out, "light of splats that fewer than {} training views see ({} of {}): {}{}{}\n",
+         kFewViews, light.few, light.splats, percent("", light.mean), percent(", arc ", light.arc),
+         percent(", off path ", light.off_path));
+}
+
+}  // namespace
+
+nlohmann::json told_light(std::FILE* out, const LightReport& light) {
+    print_light(out, light);
+    nlohmann::json views = nlohmann::json::array();
+    for (const LightOfView& view : light.views)
+        views.push_back({{"name", view.name}, {"share", view.share}});
+    nlohmann::json json{{"fewer_than", kFewViews},
+                        {"splats", light.few},
+                        {"of_splats", light.splats},
+                        {"views", views}};
+    const std::pair<const char*, const std::optional<double>&> means[] = {
+        {"mean", light.mean}, {"arc", light.arc}, {"off_path", light.off_path}};
+    for (const auto& [name, share] : means)
+        if (share) json[name] = *share;
+    return json;
+}
+
+namespace fs = std::filesystem;
+
+void take_trained_cameras(const fs::path& scene, std::vector<View>& views) {
+    const fs::path log = log_of_run(scene);
+    if (log.empty()) return;
+    const nlohmann::json start = start_of_run(log);
+    const nlohmann::json::json_pointer refined("/settings/effects/cameras");
+    if (!start.is_object() || !start.contains(refined) || start[refined] != true) return;
+    const fs::path file = log.parent_path() / "cameras.json";
+    std::map<std::string, Camera> trained;
+    for (const View& view : load_cameras(file)) trained[view.name] = view.camera;
+    std::size_t taken = 0;
+    for (View& view : views) {
+        const auto at = trained.find(view.name);
+        if (at == trained.end()) continue;
+        const Camera& from = at->second;
+        Camera& to = view.camera;
+        const double x = double(to.width) / from.width, y = double(to.height) / from.height;
+        to.rotation = from.rotation;
+        to.translation = from.translation;
+        to.fx = from.fx * x, to.cx = from.cx * x;
+        to.fy = from.fy * y, to.cy = from.cy * y;
+        ++taken;
+    }
+    say_note(fmt::format("cameras: {} of {} as {} has them, refined", taken, views.size(),
+                         file.string()));
 }
 
 }  // namespace darb

@@ -29,4 +29,10 @@ Error unknown_command(const CLI::App& app, const std::string& word);
 /// What the parser found, with the option, the reason and a remedy; of an unknown one the nearest.
 Error usage_error(const CLI::App& app, const CLI::ParseError& error);
 
+// Every command and option, for man pages and for the completion of shells.
+
+/// What `darb --options-json` prints (hidden; tools/command_pages.py reads it). Without the options
+/// that are accepted and mean nothing, or no more.
+std::string options_json(const CLI::App& app);
+
 }  // namespace darb

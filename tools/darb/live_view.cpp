@@ -1,19 +1,80 @@
 #include "tools/darb/live_view.h"
 
 #include <fmt/format.h>
-
+#include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "tools/darb/live_window.h"
+#include "engine/data/camera_list.h"
+#include "engine/data/point_cloud_ply.h"
 #include "tools/darb/open_cameras.h"
-#include "tools/darb/view_flags.h"
+#include "tools/darb/view.h"
 #include "trainer/job/scene_file.h"
 #include "viewer/display_loss.h"
+#include "viewer/live_picture.h"
 #include "viewer/seconds.h"
+#include "viewer/window.h"
 
 namespace darb {
+
+/// The window has a thread and a device of its own; what both threads touch is behind the mutex.
+struct LiveView::State {
+    State(Device& device, ViewerOptions options, const Dataset& dataset, DeviceOptions of_window,
+          const std::atomic<bool>& stop_, const std::atomic<bool>& lost_, bool white_)
+        : viewer_options(std::move(options)),
+          window_device(std::move(of_window)),
+          bounds(bounds_of(dataset)),
+          stop(stop_),
+          lost(lost_),
+          white(white_),
+          picture([this] { wake(); }),
+          drawer(device, dataset.views, bounds),
+          thread([this] { show_window(); }) {}
+    ~State() {
+        leave = true;
+        wake();
+        if (thread.joinable()) thread.join();
+    }
+
+    void wake();
+    void show_window();
+    void follow_run(ViewerWindow& shown);
+    void check_display() const;
+
+    ViewerOptions viewer_options;
+    DeviceOptions window_device;
+    Bounds bounds;
+    const std::atomic<bool>& stop;
+    const std::atomic<bool>& lost;
+    bool white;
+    LivePicture picture;
+    LiveDrawer drawer;  // of the run's thread
+    LiveCurves curves;  // of the run's thread
+
+    std::mutex mutex;
+    std::condition_variable changed;
+    ViewerWindow* window = nullptr;
+    TrainingCurves training;  // as the run reports it; pause and steps as the user wants them
+    std::optional<LiveScene> scene;
+    std::filesystem::path model;
+    int version = 0;  // of `training`
+    bool closed = false, finished = false;
+    std::atomic<bool> leave{false};  // the run failed
+    std::string failure;             // why the window closed by itself
+
+    int followed = 0;  // of the window's thread: the version that it shows
+    std::chrono::steady_clock::time_point redrawn;
+    bool begun = false, ended = false;
+    std::thread thread;  // the last member: it uses all others
+};
 
 namespace {
 
@@ -130,6 +191,137 @@ std::unique_ptr<LiveView> LiveSystem::open(Device& device, const Dataset& datase
     options.find_cameras = cameras_beside;
     return std::make_unique<LiveView>(std::make_unique<LiveView::State>(
         device, std::move(options), dataset, system_->device, stop, system_->lost, white));
+}
+
+namespace {
+
+constexpr size_t kLongestCurve = 1000;
+constexpr std::size_t kPointsLookedAt = 20'000;
+constexpr float kSmoothing = 0.05f;  // of loss and PSNR, which jump from photo to photo
+
+void thin(std::vector<float>& values) {
+    for (size_t i = 0; 2 * i < values.size(); ++i) values[i] = values[2 * i];
+    values.resize((values.size() + 1) / 2);
+}
+
+}  // namespace
+
+Bounds bounds_of(const Dataset& dataset) {
+    const std::size_t step = dataset.points.size() / kPointsLookedAt + 1;
+    PointCloud few;
+    for (std::size_t i = 0; i < dataset.points.size(); i += step)
+        for (std::size_t c = 3 * i; c < 3 * i + 3; ++c) {
+            few.position.push_back(dataset.points.position[c]);
+            few.colour.push_back(dataset.points.colour[c]);
+        }
+    if (few.size() > 0) return subject_of(points_as_splats(few), cameras_of(dataset.views));
+    Bounds bounds;
+    for (const View& view : dataset.views)
+        bounds.centre += view.camera.centre() / double(dataset.views.size());
+    bounds.radius = std::max(scene_extent(dataset), 1e-3);
+    return bounds;
+}
+
+void LiveCurves::add(const LiveStep& step, TrainingCurves& t) {
+    t.iteration = step.iteration;
+    t.last_iteration = step.last_iteration;
+    const IterationResult& r = step.result;
+    if (r.iteration == 0) return;
+    const float share = t.loss.empty() ? 1 : kSmoothing;
+    loss += share * (static_cast<float>(r.loss) - loss);
+    psnr_db += share * (static_cast<float>(r.psnr_db) - psnr_db);
+    if (r.iteration % stride != 0 && !t.loss.empty()) return;
+    t.loss.push_back(loss);
+    t.psnr_db.push_back(psnr_db);
+    t.splats.push_back(static_cast<float>(r.splats));
+    if (t.loss.size() > kLongestCurve) {
+        for (std::vector<float>* curve : {&t.loss, &t.psnr_db, &t.splats}) thin(*curve);
+        stride *= 2;
+    }
+    for (size_t e = t.held_out_psnr_db.size(); e < step.evaluations.size(); ++e)
+        t.held_out_psnr_db.push_back(static_cast<float>(step.evaluations[e].psnr_db));
+}
+
+namespace {
+
+constexpr double kNap_s = 0.05;    // of the window, between two looks at the run
+constexpr double kRedraw_s = 0.2;  // between two redraws for the curves alone
+
+}  // namespace
+
+void LiveView::State::wake() {
+    const std::lock_guard lock(mutex);
+    if (window != nullptr) window->wake();
+}
+
+void LiveView::State::check_display() const {
+    if (lost) throw Error("window", "the display is gone");
+}
+
+void LiveView::State::show_window() {
+    try {
+        Device device(window_device);
+        viewer_options.second_device = window_device;
+        ViewerWindow shown(device, viewer_options, 1280, 720);
+        struct Forget {  // before the window goes, whichever way it does
+            State& state;
+            ~Forget() {
+                const std::lock_guard lock(state.mutex);
+                state.window = nullptr;
+            }
+        } const forget{*this};
+        shown.set_title("training - darb");
+        Session& session = shown.viewer().session();
+        if (!session.photos.views.empty()) shown.viewer().choose_camera(0);
+        session.training.live = true;  // nothing may be opened from now on
+        if (white) session.display.background = glm::vec3(1.0f);
+        {
+            const std::lock_guard lock(mutex);
+            window = &shown;
+        }
+        do {
+            follow_run(shown);
+            check_display();
+        } while (!(ended && stop) && !leave && shown.pump(kNap_s));
+    } catch (const std::exception& e) {
+        const auto* known = dynamic_cast<const Error*>(&e);
+        const std::lock_guard lock(mutex);
+        failure = lost ? "the display is gone" : known != nullptr ? known->reason : e.what();
+    }
+    const std::lock_guard lock(mutex);
+    closed = true;
+    changed.notify_all();
+}
+
+// What the user wants goes to the run, what it reports to the user.
+void LiveView::State::follow_run(ViewerWindow& shown) {
+    Viewer& viewer = shown.viewer();
+    TrainingCurves& seen = viewer.session().training;
+    std::unique_lock lock(mutex);
+    if (scene && !begun) viewer.show_live(picture, bounds, *scene);
+    begun |= scene.has_value();
+    if (seen.paused != training.paused || seen.steps_to_go > 0) {
+        training.paused = seen.paused;
+        training.steps_to_go += std::exchange(seen.steps_to_go, 0);
+        changed.notify_all();
+    }
+    if (version != followed &&
+        std::chrono::steady_clock::now() - redrawn >= std::chrono::duration<double>(kRedraw_s)) {
+        const bool live = seen.live, was_finished = seen.finished;
+        followed = version;
+        seen = training;
+        seen.live = live;
+        seen.finished = was_finished;
+        seen.steps_to_go = 0;
+        redrawn = std::chrono::steady_clock::now();
+        shown.redraw();
+    }
+    if (!finished || ended) return;
+    ended = true;
+    const std::filesystem::path scene_file = model;
+    lock.unlock();
+    viewer.end_live();
+    if (!scene_file.empty()) viewer.open(scene_file);
 }
 
 }  // namespace darb

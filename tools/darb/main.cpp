@@ -19,9 +19,8 @@
 #include "engine/core/say.h"
 #include "engine/ranks/ranks.h"
 #include "tools/darb/command_list.h"
+#include "tools/darb/flags.h"
 #include "tools/darb/help.h"
-#include "tools/darb/numbers.h"
-#include "tools/darb/options_json.h"
 #include "tools/darb/stop_signals.h"
 
 namespace {

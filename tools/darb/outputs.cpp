@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <sys/stat.h>
-
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -17,6 +16,7 @@
 #include "engine/core/say.h"
 #include "engine/core/user_folders.h"
 #include "trainer/job/scene_file.h"
+#include "trainer/run/run_folder.h"
 
 namespace darb {
 
@@ -281,6 +281,33 @@ Paths together(std::initializer_list<Paths> lists) {
     Paths all;
     for (const Paths& list : lists) all.insert(all.end(), list.begin(), list.end());
     return all;
+}
+
+CLI::Option* add_json_option(CLI::App& command, std::filesystem::path& json) {
+    return command.add_option("--json", json, "write every number to this file; - is stdout");
+}
+
+std::FILE* stream_beside_json(const std::filesystem::path& json, bool quiet) {
+    return quiet ? nullptr : json == "-" ? stderr : stdout;
+}
+
+void write_json(const std::filesystem::path& to, const nlohmann::json& json) {
+    if (to.empty()) return;
+    const bool shown = to == "-";  // names may hold any bytes, and what steers a terminal
+    const std::string text =
+        json.dump(2, ' ', shown, nlohmann::json::error_handler_t::replace) + "\n";
+    shown ? tell_text(text) : write_file_atomic(to, text);
+}
+
+std::string name_in_json(const std::filesystem::path& to, const std::filesystem::path& path) {
+    const std::filesystem::path folder = to == "-" ? "." : to.parent_path();
+    return shared_name(folder.empty() ? "." : folder, path);
+}
+
+void leave_folders_out(nlohmann::json& texts, const std::filesystem::path& path) {
+    if (texts.is_string()) texts = without_folders(texts.get<std::string>(), path);
+    if (texts.is_structured())
+        for (nlohmann::json& one : texts) leave_folders_out(one, path);
 }
 
 }  // namespace darb

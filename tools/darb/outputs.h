@@ -1,11 +1,16 @@
 // The one rule for every file that a command writes: never one that it reads.
 #pragma once
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "engine/data/dataset.h"
@@ -67,5 +72,48 @@ void tell_paths(bool quiet, const Paths& written);
 
 /// All of them in one list.
 Paths together(std::initializer_list<Paths> lists);
+
+// What --json FILE means in every command that measures: every number in this file; "-" is stdout,
+// and what is for people goes to stderr then.
+
+CLI::Option* add_json_option(CLI::App& command, std::filesystem::path& json);
+
+/// Where text for people goes; null, nowhere, where quiet.
+std::FILE* stream_beside_json(const std::filesystem::path& json, bool quiet);
+
+/// Nothing where the path is empty. On stdout it is ASCII.
+void write_json(const std::filesystem::path& to, const nlohmann::json& json);
+
+/// `path` as it stands in that file: as seen from its folder, and only the last name where the two
+/// have no folder in common, so that the file says nothing of the rest of the machine.
+std::string name_in_json(const std::filesystem::path& to, const std::filesystem::path& path);
+
+/// Texts, at any depth, with `path` replaced by its last name.
+void leave_folders_out(nlohmann::json& texts, const std::filesystem::path& path);
+
+// Notes on stderr about work that may take long: nothing of what is quick.
+
+class SlowProgress {
+  public:
+    /// what: as "measuring".
+    explicit SlowProgress(std::string what) : what_(std::move(what)) {}
+
+    /// "measuring: 12 pictures", "palette: 40 %"; none in the first 5 s, then one every 5 s.
+    void at(std::size_t count, const char* unit) { note(fmt::format("{} {}", count, unit)); }
+    void at(double share) { note(fmt::format("{:.0f} %", 100 * share)); }
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    static constexpr std::chrono::seconds kBetween{5};
+
+    void note(const std::string& text) {
+        if (Clock::now() - last_ < kBetween) return;
+        last_ = Clock::now();
+        say_note(what_ + ": " + text);
+    }
+
+    std::string what_;
+    Clock::time_point last_ = Clock::now();
+};
 
 }  // namespace darb

@@ -12,7 +12,6 @@
 #include "engine/scene/splat_file.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/slow_progress.h"
 
 namespace darb {
 

@@ -1,27 +1,75 @@
 // darb plan X: which effects a data set or a scene calls for, why, and what each costs here.
-
 #include <fmt/format.h>
-
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <vector>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
 #include "engine/gpu/device_environment.h"
+#include "engine/kernels/kernel_family.h"
 #include "engine/kernels/shaped_kernel.h"
+#include "engine/plan/antialias_probe.h"
+#include "engine/scene/splat_model.h"
 #include "tools/cost/plan_subject.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/effect_flags.h"
-#include "tools/darb/json_output.h"
-#include "tools/darb/kernel_flags.h"
+#include "tools/darb/flags.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/plan_probe.h"
-#include "tools/darb/unit_flags.h"
+#include "tools/darb/scene_evaluation.h"
+#include "tools/darb/tune_flags.h"
+#include "tools/paper/compare_stats.h"
+#include "trainer/growth/initial_model.h"
 #include "trainer/job/job.h"
 #include "trainer/job/scene_file.h"
+#include "trainer/options/options.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
+
+/// Trains on the views that are not held out; every 8th is where the source names none. options:
+/// kernel and iterations count. Throws Error where there are no photos both to train on and to
+/// hold out.
+AntialiasProbe probe_antialias(const DeviceOptions& device, const Dataset& dataset,
+                               const TrainOptions& options, const EffectPlan& plan);
+
+/// Of options.kernel, whose shape each splat learns, beside the Gaussian; both as the plan has it.
+Trial try_shape(const DeviceOptions& device, const Dataset& dataset, const TrainOptions& options,
+                const EffectPlan& plan);
+/// Of --exposure-grid beside one map a photo, where the plan has exposure. Pictures are fitted to
+/// the held-out photos' exposure before they are measured.
+Trial try_exposure_grid(const DeviceOptions& device, const Dataset& dataset,
+                        const TrainOptions& options, const EffectPlan& plan);
+
+void print_probe(std::FILE* out, const AntialiasProbe& probe);
+void print_trial(std::FILE* out, const Trial& trial);
+nlohmann::json trial_json(const Trial& trial);
+nlohmann::json probe_json(const AntialiasProbe& probe);
+
+// Short training runs side by side, for the probes of darb plan.
+
+struct Arm {
+    ProbedRun run;
+    SplatModel model;
+    std::vector<double> turns_s;  // all but the first, in which shaders are compiled
+};
+
+/// Runs of these options side by side, a few iterations of each in turn, the order of turns
+/// changing: what the machine does meanwhile falls on all of them alike.
+std::vector<Arm> train_arms(Device& device, const Dataset& dataset,
+                            const std::vector<ImageU8>& photos,
+                            const std::vector<TrainOptions>& options);
+
+/// By how much a turn of `other` takes longer than one of `one`: the median, which a turn that
+/// compiles does not move.
+double price_of(const Arm& one, const Arm& other);
 
 namespace {
 
@@ -168,6 +216,209 @@ void add_plan(CLI::App& app, Action& action) {
     add_quiet_flag(*command, flags->quiet);
     add_unit_options(*command, flags->plan.units);
     command->callback([flags, &action] { action = [flags] { return run_plan(*flags); }; });
+}
+
+namespace {
+
+constexpr double kScales[] = {0.5, 1, 2, 4};
+
+/// The data set with photos set aside.
+Dataset probed_dataset(const Dataset& source, const EffectPlan& plan) {
+    Dataset dataset = source;
+    mark_held_out(dataset.views, {});
+    apply_plan(plan, dataset.views);
+    const std::size_t held_out = held_out_views(dataset.views).size();
+    if (held_out == 0 || held_out == dataset.views.size())
+        throw Error(source.root.string(), "has no photos both to train on and to hold out",
+                    "Leave out --probe.");
+    return dataset;
+}
+
+SceneEvaluation evaluation_of(const Dataset& dataset, const TrainOptions& run) {
+    SceneEvaluation evaluation;
+    evaluation.alpha_is_mask = dataset.alpha_is_mask;
+    evaluation.background = glm::vec3(run.white_background ? 1.0f : 0.0f);
+    return evaluation;
+}
+
+}  // namespace
+
+namespace {
+
+/// Both ways, which prepare() makes of the options that the plan leaves.
+Trial run_trial(const DeviceOptions& device_options, const Dataset& source,
+                const TrainOptions& options, const EffectPlan& plan, Trial trial,
+                const std::function<void(TrainOptions& usual, TrainOptions& tried)>& prepare,
+                bool fit_exposure) {
+    Dataset dataset = probed_dataset(source, plan);
+    Device device(device_options);
+    settle_tuning(device);
+    const std::vector<ImageU8> photos = load_photos(dataset.views);
+    TrainOptions tried = options;
+    apply_plan(plan, tried);
+    find_lacking_points(device, photos, tried, dataset);
+    TrainOptions usual = tried;
+    prepare(usual, tried);
+    const std::vector<View> views = held_out_views(dataset.views);
+    SceneEvaluation evaluation = evaluation_of(dataset, tried);
+    evaluation.fit_exposure = fit_exposure;
+    const std::vector<Arm> arms = train_arms(device, dataset, photos, {usual, tried});
+    const auto psnr_db = [&](const Arm& arm) {
+        return evaluate_scene(device, arm.model, views, evaluation).psnr_db;
+    };
+    trial.iterations = tried.iterations;
+    trial.usual_run = arms[0].run;
+    trial.tried_run = arms[1].run;
+    trial.price = price_of(arms[0], arms[1]);
+    trial.usual_db = psnr_db(arms[0]);
+    trial.tried_db = psnr_db(arms[1]);
+    return trial;
+}
+
+}  // namespace
+
+Trial try_shape(const DeviceOptions& device, const Dataset& dataset, const TrainOptions& options,
+                const EffectPlan& plan) {
+    const auto named = [](int kernel) { return fmt::format("--kernel {}", kernel_name(kernel)); };
+    return run_trial(
+        device, dataset, options, plan, {named(options.kernel), named(KERNEL_GAUSSIAN)},
+        [](TrainOptions& usual, TrainOptions&) { usual.kernel = KERNEL_GAUSSIAN; }, false);
+}
+
+Trial try_exposure_grid(const DeviceOptions& device, const Dataset& dataset,
+                        const TrainOptions& options, const EffectPlan& plan) {
+    return run_trial(
+        device, dataset, options, plan, {"--exposure-grid", "one map of colours a photo"},
+        [](TrainOptions&, TrainOptions& tried) { tried.exposure_grid = true; }, true);
+}
+
+AntialiasProbe probe_antialias(const DeviceOptions& device_options, const Dataset& source,
+                               const TrainOptions& options, const EffectPlan& plan) {
+    Dataset dataset = probed_dataset(source, plan);
+    const std::vector<View> held_out = held_out_views(dataset.views);
+    Device device(device_options);
+    settle_tuning(device);
+    const std::vector<ImageU8> photos = load_photos(dataset.views);
+    TrainOptions run = options;
+    apply_plan(plan, run);
+    find_lacking_points(device, photos, run, dataset);
+    TrainOptions plain = run;
+    plain.antialias = false;
+    run.antialias = true;
+    const std::vector<Arm> arms = train_arms(device, dataset, photos, {plain, run});
+    const Arm &without = arms[0], &with = arms[1];
+    AntialiasProbe probe{run.iterations, without.run, with.run, {}};
+    const SceneEvaluation evaluation = evaluation_of(dataset, run);
+    for (const double scale : kScales) {
+        if (!photos_reach(held_out, scale)) continue;
+        const std::vector<View> views = scaled_views(held_out, scale);
+        const auto psnr_db = [&](const SplatModel& model) {
+            return evaluate_scene(device, model, views, evaluation).psnr_db;
+        };
+        const Camera& camera = views.front().camera;
+        probe.sizes.push_back(
+            {scale, camera.width, camera.height, psnr_db(without.model), psnr_db(with.model)});
+    }
+    return probe;
+}
+
+// What the probes of darb plan say.
+
+namespace {
+
+std::string gain_text(double db) {
+    return fmt::format("{:+.2f} dB", db);
+}
+
+nlohmann::json arm_json(const ProbedRun& run) {
+    return {{"seconds", run.seconds}, {"splats", run.splats}};
+}
+
+}  // namespace
+
+void print_probe(std::FILE* out, const AntialiasProbe& probe) {
+    tell(out, "\nanti-aliasing, a probe of {} iterations: held-out PSNR without, with\n",
+         probe.iterations);
+    for (const ProbedSize& size : probe.sizes)
+        tell(out, "{:>4}x  {:<11}  {:>8.2f} {:>8.2f} dB  {}\n", scale_text(size.scale),
+             fmt::format("{} x {}", size.width, size.height), size.without_db, size.with_db,
+             gain_text(size.with_db - size.without_db));
+    tell(out, "price: {:.1f} s and {} splats without, {:.1f} s and {} splats with\n",
+         probe.without.seconds, probe.without.splats, probe.with.seconds, probe.with.splats);
+}
+
+nlohmann::json probe_json(const AntialiasProbe& probe) {
+    nlohmann::json sizes = nlohmann::json::array();
+    for (const ProbedSize& size : probe.sizes)
+        sizes.push_back({{"scale", size.scale},
+                         {"width", size.width},
+                         {"height", size.height},
+                         {"without_psnr_db", size.without_db},
+                         {"with_psnr_db", size.with_db}});
+    return {{"iterations", probe.iterations},
+            {"gain_db", probe.gain_db()},
+            {"sizes", sizes},
+            {"without", arm_json(probe.without)},
+            {"with", arm_json(probe.with)}};
+}
+
+void print_trial(std::FILE* out, const Trial& trial) {
+    tell(out, "\n{}, a probe of {} iterations beside {}: {}\n", trial.tried, trial.iterations,
+         trial.usual, trial.advice());
+}
+
+nlohmann::json trial_json(const Trial& trial) {
+    return {{"tried", trial.tried},
+            {"beside", trial.usual},
+            {"iterations", trial.iterations},
+            {"psnr_db", trial.tried_db},
+            {"beside_psnr_db", trial.usual_db},
+            {"gain_db", trial.gain_db()},
+            {"price", trial.price},
+            {"pays", trial.pays()},
+            {"tried_run", arm_json(trial.tried_run)},
+            {"beside_run", arm_json(trial.usual_run)}};
+}
+
+namespace {
+
+constexpr int kTurn = 10;  // iterations
+
+}  // namespace
+
+std::vector<Arm> train_arms(Device& device, const Dataset& dataset,
+                            const std::vector<ImageU8>& photos,
+                            const std::vector<TrainOptions>& options) {
+    std::vector<std::unique_ptr<Trainer>> trainers;
+    for (const TrainOptions& one : options)
+        trainers.push_back(
+            std::make_unique<Trainer>(device, dataset, photos, initial_model(dataset, one), one));
+    std::vector<Arm> arms(options.size());
+    for (int turn = 0; turn * kTurn < options.front().iterations; ++turn)
+        for (std::size_t k = 0; k < arms.size(); ++k) {
+            const std::size_t i = turn % 2 == 0 ? k : arms.size() - 1 - k;
+            const int end = std::min((turn + 1) * kTurn, options[i].iterations);
+            const auto start = std::chrono::steady_clock::now();
+            while (trainers[i]->iteration() < end) trainers[i]->step();
+            trainers[i]->drain();
+            const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+            if (turn > 0 || end == options[i].iterations) arms[i].turns_s.push_back(took.count());
+        }
+    for (std::size_t i = 0; i < arms.size(); ++i) {
+        arms[i].model = trainers[i]->model();
+        for (const double s : arms[i].turns_s) arms[i].run.seconds += s;
+        arms[i].run.splats = arms[i].model.size();
+    }
+    return arms;
+}
+
+double price_of(const Arm& one, const Arm& other) {
+    std::vector<double> ratios;
+    for (std::size_t t = 0; t < one.turns_s.size(); ++t)
+        ratios.push_back(other.turns_s[t] / one.turns_s[t]);
+    std::ranges::sort(ratios);
+    const std::size_t n = ratios.size();
+    return (ratios[(n - 1) / 2] + ratios[n / 2]) / 2 - 1;
 }
 
 }  // namespace darb

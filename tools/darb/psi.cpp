@@ -9,8 +9,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/json_output.h"
-#include "tools/darb/kernel_flags.h"
+#include "tools/darb/flags.h"
 #include "tools/darb/outputs.h"
 #include "tools/paper/psi_report.h"
 

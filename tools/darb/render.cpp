@@ -1,37 +1,72 @@
 // darb render SCENE.ply --cameras X -o DIR: a PNG of each camera; without cameras a film of a path
 // or a turn.
+#include "tools/darb/render.h"
 
 #include <fmt/format.h>
-
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
+#include <span>
+#include <string>
+#include <vector>
 
+#include "engine/check/dump.h"
 #include "engine/core/error.h"
 #include "engine/core/quantile.h"
 #include "engine/core/say.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/image_io.h"
+#include "engine/data/metrics.h"
 #include "engine/gpu/device_environment.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/raster/frame_view.h"
 #include "engine/render/renderer.h"
-#include "tools/darb/accuracy_flags.h"
+#include "engine/scene/stored_units.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/depth_file.h"
-#include "tools/darb/effect_flags.h"
-#include "tools/darb/kernel_flags.h"
-#include "tools/darb/numbers.h"
+#include "tools/darb/flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/render_film.h"
 #include "tools/darb/tune_flags.h"
-#include "tools/darb/unit_flags.h"
 #include "trainer/job/scene_file.h"
 #include "trainer/run/evaluation.h"
+#include "viewer/bounds.h"
+#include "viewer/path_export.h"
+#include "viewer/turntable.h"
 
 namespace darb {
+
+struct FilmFlags {
+    std::filesystem::path path, around;
+    std::string size, up;  // size: empty where not given
+    int fps = 0;           // 0: not given
+    double seconds = 6;    // of a turn
+};
+
+struct RenderFlags {
+    std::filesystem::path scene, cameras, output;
+    std::string device;
+    bool white_background = false, quiet = false, force = false;
+    std::optional<float> near_plane;  // world units
+    std::string effects = "auto";
+    FilmFlags film;
+    DepthFlags depth;
+    DatasetOptions data;
+    KernelFlags kernel;
+    AccuracyFlags accuracy;
+    TuneFlags tune;
+    StoredUnits units;
+};
+
+/// cameras: the option that they stand against.
+void add_film_flags(CLI::App& command, FilmFlags& flags, CLI::Option* cameras);
+/// Returns the exit code. Throws Error.
+int render_film(const RenderFlags& flags, const Accuracy& accuracy, const EffectChoice& choice);
 
 namespace {
 
@@ -146,6 +181,210 @@ void add_render(CLI::App& app, Action& action) {
     add_quiet_flag(*command, flags->quiet);
     add_unit_options(*command, flags->units);
     command->callback([flags, &action] { action = [flags] { return render(*flags); }; });
+}
+
+namespace {
+
+// Viridis, from its near end: five of its colours.
+constexpr std::array<std::array<float, 3>, 5> kDepthColours{
+    {{253, 231, 37}, {93, 201, 99}, {33, 144, 141}, {59, 82, 139}, {68, 1, 84}}};
+
+/// Rounded up to two digits.
+double unit_for(double farthest) {
+    const double unit = farthest / kDepthSteps;
+    const double digit = std::pow(10.0, std::floor(std::log10(unit)) - 1);
+    return std::ceil(unit / digit) * digit;
+}
+
+}  // namespace
+
+void check_depth(const DepthFlags& flags, const Accuracy& accuracy, const EffectChoice& effects) {
+    const bool asked = !flags.format.empty();
+    const bool on = plan_rendering({}, {}, {.depth = asked}, effects).on(EFFECT_DEPTH);
+    if (asked && !on)
+        throw Error("--depth", "the effects leave depth out",
+                    "Add +depth to --effects, or leave --depth out.");
+    if (on && accuracy.value(kStorage) != STORAGE_FLOAT32)
+        throw Error("--depth", "depths do not fit the float16 storage that was chosen",
+                    "Add --storage float32.");
+    if (on && accuracy.value(kRenderScale) != 1)
+        throw Error("--depth", "depths would be of the render scale, half the size of the frames",
+                    "Add --render-scale 1.");
+}
+
+std::vector<std::filesystem::path> depth_files(const DepthFlags& flags,
+                                               const std::filesystem::path& frame) {
+    const std::string stem = frame.stem().string() + "_depth";
+    std::filesystem::path numbers = frame, picture = frame;
+    return {numbers.replace_filename(stem + (flags.format == "npy" ? ".npy" : ".png")),
+            picture.replace_filename(stem + "_colours.png")};
+}
+
+void add_depth_files(const DepthFlags& flags, const std::vector<std::filesystem::path>& frames,
+                     std::vector<std::filesystem::path>& files) {
+    for (const auto& frame : frames)
+        for (auto& file : depth_files(flags, frame)) files.push_back(std::move(file));
+}
+
+ImageU8 depth_picture(const ImageF& depth) {
+    const auto channels = static_cast<size_t>(depth.channels);
+    std::vector<float> seen;
+    for (size_t p = 0; p < depth.data.size(); p += channels)
+        if (depth.data[p] > 0) seen.push_back(depth.data[p]);
+    std::ranges::sort(seen);
+    const float near = seen.empty() ? 0 : seen[seen.size() / 100];
+    const float far = seen.empty() ? 1 : seen[seen.size() - 1 - seen.size() / 100];
+    ImageU8 picture(depth.width, depth.height, 3);
+    for (size_t p = 0; p < depth.data.size() / channels; ++p) {
+        const float value = depth.data[p * channels];
+        if (value <= 0) continue;
+        const float share = std::clamp((value - near) / std::max(far - near, 1e-9f), 0.0f, 1.0f);
+        const float at = share * (std::size(kDepthColours) - 1);
+        const size_t low = std::min(static_cast<size_t>(at), std::size(kDepthColours) - 2);
+        for (size_t c = 0; c < 3; ++c)
+            picture.data[3 * p + c] = static_cast<std::uint8_t>(std::lround(std::lerp(
+                kDepthColours[low][c], kDepthColours[low + 1][c], at - static_cast<float>(low))));
+    }
+    return picture;
+}
+
+void DepthFiles::write(const std::filesystem::path& frame, const ImageF& depth) {
+    const std::vector<std::filesystem::path> files = depth_files(flags_, frame);
+    const std::filesystem::path& file = files.front();
+    write_png(files.back(), depth_picture(depth));
+    if (flags_.format != "npy") {
+        const DepthRange range = write_depth_png(file, depth, flags_.unit);
+        range_.clipped += range.clipped;
+        range_.farthest = std::max(range_.farthest, range.farthest);
+        return;
+    }
+    const auto channels = static_cast<size_t>(depth.channels);
+    std::vector<float> values;
+    for (size_t p = 0; p < depth.data.size(); p += channels) values.push_back(depth.data[p]);
+    check::write_npy(file, {size_t(depth.height), size_t(depth.width)},
+                     std::span<const float>(values));
+}
+
+void DepthFiles::print_clipped() const {
+    if (range_.clipped == 0) return;
+    say("warning: {} pixels of the depth PNGs lie beyond {:g} world units, their last step, "
+        "up to {:g}: --depth-unit {:g} holds all, as does --depth npy\n",
+        range_.clipped, kDepthSteps * flags_.unit, range_.farthest, unit_for(range_.farthest));
+}
+
+namespace {
+
+constexpr const char* kUsualSize = "1280x720";
+constexpr int kUsualFps = 30;
+
+// What is given, else what the path says.
+PixelSize film_size(const FilmFlags& flags, const CameraPath& path) {
+    if (!flags.size.empty()) return parse_size(flags.size);
+    return path.width > 0 ? PixelSize{path.width, path.height} : parse_size(kUsualSize);
+}
+
+int film_fps(const FilmFlags& flags, const CameraPath& path) {
+    if (flags.fps > 0) return flags.fps;
+    return path.fps > 0 ? std::clamp(static_cast<int>(std::lround(path.fps)), 1, 240) : kUsualFps;
+}
+
+/// What the turn goes around is what these look at; those beside the scene may be unreadable.
+std::vector<Camera> cameras_of_turn(const RenderFlags& flags) {
+    if (!flags.film.around.empty()) return cameras_of(open_cameras(flags.film.around));
+    try {
+        return cameras_of(cameras_beside(flags.scene));
+    } catch (const Error& e) {
+        say("warning: {}\n", e.what());
+        return {};
+    }
+}
+
+CameraPath turn_around(const RenderFlags& render, const PixelSize& size, const SplatModel& model,
+                       const std::string& stated_up) {
+    const FilmFlags& flags = render.film;
+    TurntableOptions options;
+    options.seconds = flags.seconds;
+    options.fps = film_fps(flags, {});
+    options.width = size.width;
+    options.height = size.height;
+    options.cameras = cameras_of_turn(render);
+    const std::optional<glm::dvec3> held = up_of_cameras(options.cameras);
+    options.up = !flags.up.empty()    ? up_from_name(flags.up)
+                 : held               ? *held
+                 : !stated_up.empty() ? up_from_name(stated_up)
+                                      : guess_up(model);
+    return turntable(model, options);
+}
+
+}  // namespace
+
+void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
+    CLI::Option* const path = c.add_option(
+        "--path", flags.path,
+        "a camera path that the viewer saved, or a camera_path.json of nerfstudio; "
+        "without it and --cameras the camera goes once around what the scene's cameras "
+        "look at. Both make a video, too, where ffmpeg is");
+    path->excludes(cameras);
+    c.add_option("--size", flags.size, "WIDTHxHEIGHT of a path's or a turn's frames, px")
+        ->default_str("nerfstudio's path: as it says, else 1280x720")
+        ->excludes(cameras);
+    c.add_option("--fps", flags.fps, "their frames a second")
+        ->check(CLI::Range(1, 240))
+        ->default_str("nerfstudio's path: as it says, else 30")
+        ->excludes(cameras);
+    c.add_option("--seconds", flags.seconds, "of the turn")
+        ->check(CLI::Range(0.1, 600.0))
+        ->capture_default_str()
+        ->excludes(cameras)
+        ->excludes(path);
+    c.add_option("--up", flags.up,
+                 "x, -x, y, -y, z or -z, of the turn (default: as the cameras were held, else what "
+                 "the file says, else a guess)")
+        ->excludes(cameras)
+        ->excludes(path);
+    c.add_option("--around", flags.around,
+                 "a cameras.json, a transforms.json or a data set: the turn goes around what these "
+                 "cameras look at (default: the cameras.json of the scene's run)")
+        ->excludes(cameras)
+        ->excludes(path);
+}
+
+int render_film(const RenderFlags& flags, const Accuracy& accuracy, const EffectChoice& choice) {
+    if (!flags.depth.format.empty())
+        throw Error("--depth", "goes with --cameras alone", "Name the cameras, or leave it out.");
+    if (flags.data.resolution != -1)
+        throw Error("-r", "divides the size of cameras, and there are none", "Use --size.");
+    CameraPath path;
+    if (!flags.film.path.empty()) path = read_camera_path(flags.film.path);
+    say_notes(path.notes);
+    const PixelSize size = film_size(flags.film, path);
+    SplatFile facts;
+    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, &facts, flags.units));
+    note_unused_choices(flags.accuracy, model.kernel);
+    if (flags.film.path.empty()) path = turn_around(flags, size, model, facts.up);
+    DeviceOptions device_options = command_device(flags.device);
+    Device device(device_options);
+    settle_tuning(device, flags.tune);
+    check_frame(device, size.width, size.height, "--size");
+    const float near_plane =
+        flags.near_plane ? *flags.near_plane : near_plane_for(scene_bounds(model));
+    EffectPlan plan =
+        plan_rendering(model, {}, {.near_plane = near_plane, .free_camera = true}, choice);
+    apply_plan(plan, model);
+    Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
+    const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
+    PathExport film(path, {flags.output, film_fps(flags.film, path), size.width, size.height, {}});
+    while (!film.done())
+        film.step(
+            [&](const Camera& camera, const DisplaySettings&) {
+                const ImageF image = renderer.render(camera, background, -1, near_plane);
+                plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
+                return to_8bit(image);
+            },
+            true);
+    tell(flags.quiet ? nullptr : stdout, "effects: {}\n{}\n", plan_line(plan), film.summary());
+    tell_paths(flags.quiet, {flags.output});
+    return 0;
 }
 
 }  // namespace darb

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/darb/accuracy_flags.h"
-#include "tools/darb/pixel_size.h"
+#include "tools/darb/flags.h"
 #include "tools/darb/tune_flags.h"
 #include "viewer/viewer.h"
 
