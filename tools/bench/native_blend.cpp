@@ -62,6 +62,7 @@ namespace baseline {
 #endif
 namespace avx2 {
 #define DARB_LANES 8
+#include "tools/bench/native_blend_loops.h"
 #undef DARB_LANES
 }  // namespace avx2
 #if defined(__clang__)
@@ -73,6 +74,7 @@ namespace avx2 {
 #endif
 namespace avx512 {
 #define DARB_LANES 16
+#include "tools/bench/native_blend_loops.h"
 #undef DARB_LANES
 }  // namespace avx512
 #if defined(__clang__)
