@@ -7,12 +7,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <nlohmann/json_fwd.hpp>
+
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "engine/core/say.h"
 #include "engine/data/dataset.h"
 #include "engine/scene/splat_file.h"
 
