@@ -99,7 +99,7 @@ GUARDS = [
     ("opacity at 1, thousands of opaque layers", "alpha_limit", BLEND,
      "min(light.w * kernel_value(x * x + y * y, exponent), ALPHA_MAX)", "light.w * kernel_value(x * x + y * y, exponent)",
      "blend_test", "every_kernel/Blend.opaque_stack_stops_before_the_transmittance_limit/gaussian_psi"),
-    ("opacity at 1, thousands of opaque layers", "transmittance_stop", BLEND,
+    ("opacity at 1, thousands of opaque layers", "transmittance_stop", "shaders/forward/blend_pixels.glsl",
      "next >= MIN_TRANSMITTANCE;", "before >= 0.0;",
      "blend_test", "every_kernel/Blend.opaque_stack_stops_before_the_transmittance_limit/gaussian_psi"),
     ("opacity at 1, thousands of opaque layers", "alpha_limit_gradient", SPLAT_SUMS,
@@ -145,7 +145,7 @@ GUARDS = [
     ("coordinates at 1e6 m", "difference_before_rotation", COVARIANCE,
      "(p - camera.centre) - camera.centre_rest", "p - camera.centre",
      "hard_case_test", "every/HardCase.matches_double/floats_far_off_gaussian_psi"),
-    ("odd image sizes, more than 65,536 tiles", "pixels_within_the_image", "shaders/forward/blend.comp",
+    ("odd image sizes, more than 65,536 tiles", "pixels_within_the_image", "shaders/forward/blend_state.glsl",
      """        if (at.x >= args.width || at.y >= args.height) continue;
         const uint o = at.y * args.width + at.x;
         const float transmittance""", """        const uint o = at.y * args.width + at.x;
