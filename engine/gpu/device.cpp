@@ -18,6 +18,12 @@
 
 namespace darb {
 
+std::uint32_t lanes_by_pixels(const DeviceInfo& info, std::uint32_t chosen) {
+    constexpr std::uint32_t most = 32, shared_bytes = 32 * 1024;
+    if (info.shared_memory_bytes < shared_bytes || info.min_subgroup_size > most) return 0;
+    return std::min(chosen, most);
+}
+
 Tuning usual_tuning(const DeviceInfo& info) {
     constexpr std::uint32_t blocks = 4;  // of a tile; a subgroup a block is the best on lavapipe
     const bool lavapipe = info.driver.starts_with("llvmpipe");

@@ -15,6 +15,8 @@ namespace {
 constexpr std::uint32_t kTilePixels = TILE_SIZE * TILE_SIZE, kBlocks = 4;
 constexpr std::uint32_t kListBytes =
     128 * 8;  // lib/hits.glsl: CHUNK intersections of two words a subgroup
+constexpr std::uint32_t kRecordBytes = 3 * 16;  // lib/records.glsl: a splat of each lane
+constexpr const char* kRecords = "records";
 
 std::uint32_t clamped_subgroup(const DeviceInfo& info) {
     return std::clamp(info.subgroup_size, 4u, 64u);
@@ -22,6 +24,20 @@ std::uint32_t clamped_subgroup(const DeviceInfo& info) {
 
 std::string shape_name(std::uint32_t threads) {
     return fmt::format("{}x{}", threads, kTilePixels / threads);
+}
+
+template <std::size_t count, class Enum>
+std::vector<std::string> usual_first(const char* const (&all)[count], Enum usual) {
+    const std::string first = all[static_cast<std::size_t>(usual)];
+    std::vector<std::string> names{first};
+    for (const char* name : all)
+        if (name != first) names.emplace_back(name);
+    return names;
+}
+
+template <class Enum, std::size_t count>
+Enum named(const char* const (&all)[count], const std::string& name) {
+    return static_cast<Enum>(std::find(std::begin(all), std::end(all), name) - std::begin(all));
 }
 
 // Threads x pixels of a thread. A subgroup a block first, which is the best on lavapipe. Of more
@@ -35,7 +51,18 @@ std::vector<std::string> blend_shapes(const DeviceInfo& info) {
                           threads / subgroup * kListBytes <= info.shared_memory_bytes;
         if (fits && threads != kBlocks * subgroup) shapes.push_back(shape_name(threads));
     }
+    if (kBlocks * (kListBytes + subgroup * kRecordBytes) <= info.shared_memory_bytes)
+        shapes.emplace_back(kRecords);
     return shapes;
+}
+
+std::vector<std::string> backward_blends(const DeviceInfo& info) {
+    std::vector<std::string> forms = usual_first(kBackwardBlends, usual_tuning(info).backward);
+    if (lanes_by_pixels(info, clamped_subgroup(info)) == 0)
+        std::erase_if(forms, [](const std::string& form) {
+            return is_by_pixels(named<BackwardBlend>(kBackwardBlends, form));
+        });
+    return forms;
 }
 
 // The device's own first. A subgroup's list of a tile is in shared memory. One size is no choice.
@@ -73,20 +100,6 @@ void check_names(const DeviceInfo& info, const TuningNames& names, const std::st
     }
 }
 
-template <std::size_t count, class Enum>
-std::vector<std::string> usual_first(const char* const (&all)[count], Enum usual) {
-    const std::string first = all[static_cast<std::size_t>(usual)];
-    std::vector<std::string> names{first};
-    for (const char* name : all)
-        if (name != first) names.emplace_back(name);
-    return names;
-}
-
-template <class Enum, std::size_t count>
-Enum named(const char* const (&all)[count], const std::string& name) {
-    return static_cast<Enum>(std::find(std::begin(all), std::end(all), name) - std::begin(all));
-}
-
 TuningNames split_names(const DeviceInfo& info, std::string_view text, const std::string& where) {
     TuningNames names;
     while (!text.empty()) {
@@ -118,10 +131,7 @@ std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
          usual_first(kSortScatters, usual_tuning(info).scatter),
          {"depth sort", "tile sort"}},
         {"blend", blend_shapes(info), {"blend"}},
-        {"backward",
-         usual_first(kBackwardBlends, usual_tuning(info).backward),
-         {"blend", "blend backward"},
-         true},
+        {"backward", backward_blends(info), {"blend", "blend backward"}, true},
         {"loss", usual_first(kLossWays, usual_tuning(info).loss), {"loss"}},
         {"exp", {"polynomial", "builtin"}, {"blend", "blend backward"}, true},
         {"photos", usual_first(kPhotoPlaces, usual_tuning(info).photos), {}}};
@@ -158,13 +168,14 @@ std::string names_text(const TuningNames& names) {
 }
 
 TuningNames tuning_names(const Tuning& tuning) {
-    TuningNames names{{"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
-                      {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
-                      {"blend", shape_name(tuning.blend_threads)},
-                      {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]},
-                      {"loss", kLossWays[static_cast<std::size_t>(tuning.loss)]},
-                      {"exp", tuning.exp_builtin ? "builtin" : "polynomial"},
-                      {"photos", kPhotoPlaces[static_cast<std::size_t>(tuning.photos)]}};
+    TuningNames names{
+        {"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
+        {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
+        {"blend", tuning.blend_records ? std::string(kRecords) : shape_name(tuning.blend_threads)},
+        {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]},
+        {"loss", kLossWays[static_cast<std::size_t>(tuning.loss)]},
+        {"exp", tuning.exp_builtin ? "builtin" : "polynomial"},
+        {"photos", kPhotoPlaces[static_cast<std::size_t>(tuning.photos)]}};
     if (tuning.blend_lanes != 0) names["lanes"] = std::to_string(tuning.blend_lanes);
     return names;
 }
@@ -173,7 +184,8 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
     for (const auto& [name, choice] : names) {
         if (name == "scan") tuning.scan_by_thread = choice == "thread";
         if (name == "scatter") tuning.scatter = named<SortScatter>(kSortScatters, choice);
-        if (name == "blend")
+        if (name == "blend") tuning.blend_records = choice == kRecords;
+        if (name == "blend" && choice != kRecords)
             std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_threads);
         if (name == "lanes")
             std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_lanes);
@@ -188,14 +200,16 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
 Tuning resumed_tuning(const DeviceInfo& info, Tuning tuning, std::string_view text,
                       const std::string& where) {
     tuning.blend_lanes = 0;
+    tuning.blend_records = false;
     tuning.exp_builtin = false;
     return with_names(tuning, checkpoint_tuning(info, text, where));
 }
 
 std::string result_tuning(const Device& device) {
     TuningNames names = tuning_names(device.tuning());
+    const bool records = device.tuning().blend_records;
     for (const TuningGroup& group : tuning_groups(device.info()))
-        if (!group.changes_bits) names.erase(group.name);
+        if (!group.changes_bits && !(records && group.name == "blend")) names.erase(group.name);
     if (!device.tuning().exp_builtin) names.erase("exp");
     return names_text(names);
 }

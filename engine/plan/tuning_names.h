@@ -45,12 +45,13 @@ TuningNames tuning_names(const Tuning& tuning);
 /// names as parse_tuning gives them.
 Tuning with_names(Tuning tuning, const TuningNames& names);
 /// The tuning of who goes on with what began with this text: the same bits. Lanes that it does not
-/// name were the device's own, and exp that it does not name a polynomial. Throws as parse_tuning.
+/// name were the device's own, exp that it does not name a polynomial, and blend no records. Throws
+/// as parse_tuning.
 Tuning resumed_tuning(const DeviceInfo& info, Tuning tuning, std::string_view text,
                       const std::string& where);
 
-/// Of the groups that change bits, as text: what a run must keep to repeat. Without exp it is a
-/// polynomial, as in older files.
+/// Of the groups that change bits, as text: what a run must keep to repeat, and the blend where it
+/// is by records. Without exp it is a polynomial, as in older files.
 std::string result_tuning(const Device& device);
 
 }  // namespace darb

@@ -69,6 +69,10 @@ void BlendBackward::make_pipelines(bool segmented) {
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window_intersections_);
     constants = for_several_passes(std::move(constants));  // of all methods
     segmented_ = segmented;
+    if (is_by_pixels(method_)) {
+        make_by_pixels(std::move(constants));
+        return;
+    }
     if (method_ == BackwardBlend::subgroup) {
         blend_ = Pipeline(*device_, "blend_backward", constants, true, subgroup);
         return;
@@ -82,6 +86,22 @@ void BlendBackward::make_pipelines(bool segmented) {
     constants["THREADS"] = SPLAT_GROUP;
     if (!bucket_tiles_) bucket_tiles_ = Pipeline(*device_, "bucket_tiles", constants);
     bucket_behind_ = Pipeline(*device_, "bucket_behind", constants);
+}
+
+void BlendBackward::make_by_pixels(SpecConstants constants) {
+    const std::uint32_t lanes = lanes_by_pixels(device_->info(), blend_subgroup(*device_));
+    if (lanes == 0)
+        throw Error(
+            "backward blend",
+            fmt::format("backward={} needs subgroups of 32 lanes or fewer and 32 KiB of "
+                        "shared memory, which {} has not",
+                        kBackwardBlends[static_cast<std::size_t>(method_)], device_->info().name),
+            "Use --tune backward=team.");
+    constants["SUBGROUP_SIZE"] = static_cast<std::int32_t>(lanes);
+    constants["PIXELS"] = static_cast<std::int32_t>(64 / lanes);
+    constants["THREADS"] = static_cast<std::int32_t>(4 * lanes);  // a subgroup a block
+    constants["BATCH"] = method_ == BackwardBlend::pixels4 ? 4 : 8;
+    blend_ = Pipeline(*device_, "blend_backward_pixels", constants, true, lanes);
 }
 
 // A size is taken note of once its buffers are there, as in FrameBuffers.
@@ -119,7 +139,7 @@ void BlendBackward::record(Commands& commands, const FrameView& view, const Fram
     if (size.list_segments > 1 && !segmented_) make_pipelines(true);
     if (size.list_segments > 1 && behind_.bytes() < size.pixels * 4)
         make_buffers(*device_, *this, segment_buffers(size), "blend backward");
-    if (method_ != BackwardBlend::team) {  // which writes every slot
+    if (!writes_every_slot(method_)) {
         commands.fill(partials_, 0);
         commands.fill(rest_, 0);
         if (kernel_has_shape(options_.kernel)) commands.fill(exponent_, 0);

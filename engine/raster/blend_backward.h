@@ -44,6 +44,7 @@ class BlendBackward {
     static BufferList<BlendBackward> segment_buffers(const FrameSize& size);
     static BufferList<BlendBackward> bucket_buffers(std::uint64_t records);
     void make_pipelines(bool segmented);
+    void make_by_pixels(SpecConstants constants);
     void record_lists(Commands& commands, const Frame& frame, const Buffer& d_image,
                       gpu::BlendArgs args);
     void record_buckets(Commands& commands, const Frame& frame, const Buffer& d_image,

@@ -18,6 +18,8 @@ namespace darb {
 
 namespace {
 
+constexpr std::uint32_t kBlocks = TILE_SIZE * TILE_SIZE / 64;
+
 int bits_for(std::uint32_t count) {
     return std::max(1, static_cast<int>(std::bit_width(count > 0 ? count - 1 : 0)));
 }
@@ -78,7 +80,10 @@ std::uint32_t add_block_constants(const Device& device, SpecConstants& constants
 Forward::Forward(Device& device, const ForwardOptions& options)
     : device_(&device),
       options_(options),
-      blend_threads_(std::max(device.tuning().blend_threads, blend_subgroup(device))) {
+      records_(device.tuning().blend_records),
+      blend_threads_(
+          std::max(records_ ? kBlocks * blend_subgroup(device) : device.tuning().blend_threads,
+                   blend_subgroup(device))) {
     if (options.store_for_backward && options.depth_order == DEPTH_ORDER_PIXEL)
         throw Error("frame", "a resorted pixel cannot be walked back",
                     "Use another depth order, or do not store for a backward pass.");
@@ -119,8 +124,13 @@ Pipeline& Forward::blend_pipeline(const Frame& frame) {
     blend["CHECKPOINTS"] = frame.size.bucket > 0 ? 1 : 0;
     if (frame.size.bucket > 0) blend["BUCKET"] = static_cast<std::int32_t>(frame.size.bucket);
     blend["SEGMENT"] = parts ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
-    pipeline = Pipeline(*device_, "blend", blend, true, subgroup);
+    pipeline = Pipeline(*device_, blends_records(frame) ? "blend_records" : "blend", blend, true,
+                        subgroup);
     return pipeline;
+}
+
+bool Forward::blends_records(const Frame& frame) const {
+    return records_ && options_.depth_order != DEPTH_ORDER_PIXEL && frame.size.bucket == 0;
 }
 
 void Forward::make_huge_pipelines() {

@@ -49,6 +49,8 @@ class Forward {
   private:
     Pipeline& project_pipeline(int sh_degree, int sh_stored);
     Pipeline& blend_pipeline(const Frame& frame);
+    /// By records, which neither resort pixels nor leave checkpoints: else a subgroup a block.
+    bool blends_records(const Frame& frame) const;
     void make_huge_pipelines();
     void record_projection(Commands& commands, const GpuSplats& splats, const FrameView& view,
                            const Frame& frame);
@@ -60,7 +62,8 @@ class Forward {
 
     Device* device_;
     ForwardOptions options_;
-    std::uint32_t blend_threads_;  // of a tile's workgroup, by the device's tuning
+    bool records_;                                     // by the device's tuning, as what follows
+    std::uint32_t blend_threads_;                      // of a tile's workgroup
     std::map<std::pair<int, int>, Pipeline> project_;  // by SH degree in use and in the buffers
     Pipeline compact_, gather_counts_, groups_visible_, groups_intersections_, emit_, tile_ranges_,
         list_lengths_;

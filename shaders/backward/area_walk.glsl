@@ -3,41 +3,7 @@
 // backward/splat_sums.glsl, splat_exponent, and where the sums of intersection j of the sorted list go: place_of(j),
 // put_sums, put_exponent of that of a kernel with shapes, and put_depth with DEPTH_SUM.
 
-struct Pixels {
-    float transmittance[PIXELS];
-    float behind[PIXELS];
-    vec3 d_colour[PIXELS];
-    uint last[PIXELS];
-};
-
-// With DEPTH_SUM, of each pixel; apart, so that nothing of it is left without.
-const uint DEPTHS = DEPTH_SUM == 1 ? PIXELS : 1u;
-float d_depth[DEPTHS];
-
-uint load_pixels(uvec2 first, out Pixels px) {
-    const vec3 background = vec3(args.background_r, args.background_g, args.background_b);
-    const uint plane = args.width * args.height;
-    uint last = 0u;
-    for (uint k = 0u; k < PIXELS; ++k) {
-        const uvec2 at = first + slot_offset(k);
-        px.d_colour[k] = vec3(0.0);
-        px.behind[k] = 0.0;
-        px.transmittance[k] = 1.0;
-        px.last[k] = 0u;
-        if (DEPTH_SUM == 1) d_depth[k] = 0.0;
-        if (at.x < args.width && at.y < args.height) {
-            const uint o = at.y * args.width + at.x;
-            px.d_colour[k] = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
-            px.transmittance[k] = final_transmittance[o];
-            px.last[k] = last_intersection[o];
-            if (ALPHA_GRADIENT == 1) px.behind[k] = -d_image[3u * plane + o];
-            if (DEPTH_SUM == 1) d_depth[k] = d_image[DEPTH_GRADIENT_PLANE * plane + o];
-        }
-        px.behind[k] += dot(px.d_colour[k], background);
-        last = max(last, px.last[k]);
-    }
-    return last;
-}
+#include "backward/area_pixels.glsl"
 
 Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, float exponent, float z,
                 uint number) {
@@ -89,18 +55,4 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
     } while (rest > 0u);
 }
 
-// What is behind the intersections of this dispatch, from and for the other dispatches.
-void load_behind(inout Pixels px, uvec2 first) {
-    for (uint k = 0u; k < PIXELS; ++k) {
-        const uvec2 at = first + slot_offset(k);
-        if (at.x < args.width && at.y < args.height) px.behind[k] = behind[at.y * args.width + at.x];
-    }
-}
-void store_state(Pixels px, uvec2 first) {
-    for (uint k = 0u; k < PIXELS; ++k) {
-        const uvec2 at = first + slot_offset(k);
-        if (at.x >= args.width || at.y >= args.height) continue;
-        final_transmittance[at.y * args.width + at.x] = px.transmittance[k];
-        behind[at.y * args.width + at.x] = px.behind[k];
-    }
-}
+#include "backward/area_state.glsl"

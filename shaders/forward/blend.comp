@@ -14,68 +14,8 @@
 #extension GL_KHR_shader_subgroup_ballot : require
 #extension GL_KHR_shader_subgroup_vote : require
 
-#include "shared/limits.h"
-#include "shared/render_args.h"
-
-layout(local_size_x_id = 0) in;
-layout(constant_id = 0) const uint THREADS = 32;       // TILE_PIXELS / PIXELS
-layout(constant_id = 1) const int STORE_FOR_BACKWARD = 0;
-layout(constant_id = 2) const float MIN_TRANSMITTANCE = TRANSMITTANCE_STOP * (1.0 - TRANSMITTANCE_SLACK);
-layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
-layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
-layout(constant_id = 8) const int CHECKPOINTS = 0;  // 1: a record a bucket for the backward pass
-
-#include "kernels/kernel.glsl"
-layout(push_constant, scalar) uniform Push { BlendArgs args; };
-layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
-layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3][H][W], a plane more with DEPTH_SUM
-layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
-layout(set = 0, binding = 8, scalar) buffer LastIntersection { uint last_intersection[]; };
-layout(set = 0, binding = 9, scalar) writeonly buffer Checkpoints { float checkpoints[]; };  // where CHECKPOINTS
-layout(set = 0, binding = 10, scalar) readonly buffer SplatExponent { float splat_exponent[]; };  // where SHAPED
-
-#define SHAPE_BINDING 3
-#define LIGHT_BINDING 4
-#define BOUND_BINDING 5
-#include "lib/projected.glsl"
-#include "lib/area.glsl"
-#include "lib/list_part.glsl"
-#include "lib/bucket.glsl"
-const uint CHUNK = CHECKPOINTS == 1 ? BUCKET : 128u;
-#include "lib/hits.glsl"
-#include "lib/window.glsl"
-
-struct Pixels {
-    float transmittance[PIXELS];  // negative once the pixel has ended
-    vec3 colour[PIXELS];
-    uint last[PIXELS];  // 1 + the last intersection looked at while it was alive; 0: none
-};
-
-// Light of the current bucket; not in Pixels, so that nothing of it is left without checkpoints. So are depths.
-const uint BUCKET_COLOURS = CHECKPOINTS == 1 ? PIXELS : 1u;
-vec3 bucket_colour[BUCKET_COLOURS];
-const uint DEPTHS = DEPTH_SUM == 1 ? PIXELS : 1u, BUCKET_DEPTHS = CHECKPOINTS == 1 ? DEPTHS : 1u;
-float depth_sum[DEPTHS], bucket_depth[BUCKET_DEPTHS];
-
-vec3 load_depth(uint splat) {  // z and its slope
-    const vec4 bound = splat_bound[splat];
-    return vec3(bound.z, unpackHalf2x16(floatBitsToUint(bound.w)));
-}
-
-void blend_sample(inout Pixels px, uint k, float alpha, vec3 colour, float depth, uint number) {
-    const float before = px.transmittance[k];
-    const float wanted = alpha * before;
-    const float next = before - wanted;
-    const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for what has ended
-    px.colour[k] += (goes_on ? wanted : 0.0) * colour;
-    if (CHECKPOINTS == 1) bucket_colour[k] += (goes_on ? wanted : 0.0) * colour;
-    if (DEPTH_SUM == 1) depth_sum[k] += (goes_on ? wanted : 0.0) * depth;
-    if (DEPTH_SUM == 1 && CHECKPOINTS == 1) bucket_depth[k] += (goes_on ? wanted : 0.0) * depth;
-    px.transmittance[k] = mix(-abs(before), next, goes_on);
-    if (STORE_FOR_BACKWARD == 1) px.last[k] = goes_on ? number : px.last[k];
-}
+#include "forward/blend_interface.glsl"
+#include "forward/blend_pixels.glsl"
 
 // One splat on all pixels of the thread. d: mean - centre of the thread's first pixel.
 void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, float exponent, uint number,
@@ -132,40 +72,7 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
     return subgroupAny(alive > 0.0);
 }
 
-// The state that the dispatch before this one left.
-void load(inout Pixels px, uvec2 first) {
-    const uint plane = args.width * args.height;
-    for (uint k = 0u; k < PIXELS; ++k) {
-        const uvec2 at = first + slot_offset(k);
-        if (at.x >= args.width || at.y >= args.height) continue;
-        const uint o = at.y * args.width + at.x;
-        px.transmittance[k] = final_transmittance[o];
-        px.colour[k] = vec3(image[o], image[plane + o], image[2u * plane + o]);
-        if (DEPTH_SUM == 1) depth_sum[k] = image[DEPTH_PLANE * plane + o];
-        if (STORE_FOR_BACKWARD == 1) px.last[k] = last_intersection[o];
-    }
-}
-
-void store(Pixels px, uvec2 first) {
-    const bool more = SEGMENT > 0u && args.segment + 1u < args.segments;
-    const vec3 background =
-        more ? vec3(0.0) : vec3(args.background_r, args.background_g, args.background_b);
-    const uint plane = args.width * args.height;
-    for (uint k = 0u; k < PIXELS; ++k) {
-        const uvec2 at = first + slot_offset(k);
-        if (at.x >= args.width || at.y >= args.height) continue;
-        const uint o = at.y * args.width + at.x;
-        const float transmittance = abs(px.transmittance[k]);
-        const vec3 colour = px.colour[k] + transmittance * background;
-        image[o] = colour.r;
-        image[plane + o] = colour.g;
-        image[2u * plane + o] = colour.b;
-        if (DEPTH_SUM == 1) image[DEPTH_PLANE * plane + o] = depth_sum[k];
-        if (STORE_FOR_BACKWARD == 1) last_intersection[o] = px.last[k];
-        if (STORE_FOR_BACKWARD == 1 || SEGMENT > 0u)
-            final_transmittance[o] = more ? px.transmittance[k] : transmittance;
-    }
-}
+#include "forward/blend_state.glsl"
 
 // Closes a bucket.
 void store_checkpoint(Pixels px, uint record) {

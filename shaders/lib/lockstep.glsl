@@ -1,9 +1,14 @@
 // The order of shared memory accesses among the threads of a subgroup.
 // LOCKSTEP 1: they are the lanes of one vector, as on lavapipe, and need no barrier among them. lavapipe of
 // Mesa 25.0 makes one of the whole workgroup, and loses the subgroups that go on after another has ended.
+#ifndef DARB_LOCKSTEP_GLSL
+#define DARB_LOCKSTEP_GLSL
+
 layout(constant_id = 5) const int LOCKSTEP = 0;
 
 void order_within_subgroup() {
     subgroupMemoryBarrierShared();
     if (LOCKSTEP == 0) subgroupBarrier();
 }
+
+#endif

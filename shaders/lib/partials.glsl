@@ -1,5 +1,6 @@
 // The sums of splat-tile intersections, PARTIALS floats each, in the order of the intersections' slots: blend_backward
-// adds to them (define PARTIALS_PUT as +=), blend_backward_team sets them (as =), others read them. Where they are more than one binding holds, the buffer is bound
+// adds to them (define PARTIALS_PUT as +=), blend_backward_team sets them (as =), blend_backward_pixels sets four at a
+// time (PARTIALS_PUT_FOURS), others read them. Where they are more than one binding holds, the buffer is bound
 // in PARTIAL_WINDOWS windows of WINDOW_INTERSECTIONS intersections each, from PARTIALS_BINDING on.
 
 layout(constant_id = 9) const uint WINDOW_INTERSECTIONS = 0;  // 0: the first window has them all
@@ -7,6 +8,9 @@ layout(constant_id = 9) const uint WINDOW_INTERSECTIONS = 0;  // 0: the first wi
 #ifdef PARTIALS_PUT
 #define PARTIALS_WINDOW(number) layout(set = 0, binding = PARTIALS_BINDING + number, scalar) buffer
 #define PARTIALS_OF float
+#elif defined(PARTIALS_PUT_FOURS)
+#define PARTIALS_WINDOW(number) layout(set = 0, binding = PARTIALS_BINDING + number, scalar) writeonly buffer
+#define PARTIALS_OF vec4
 #else
 #define PARTIALS_WINDOW(number) layout(set = 0, binding = PARTIALS_BINDING + number, scalar) readonly buffer
 #define PARTIALS_OF vec4
@@ -33,6 +37,16 @@ void put_partial(uint slot, uint i, float value) {
     else if (window == 2u) partials2[at] PARTIALS_PUT value;
     else if (window == 3u) partials3[at] PARTIALS_PUT value;
     else partials4[at] PARTIALS_PUT value;
+}
+#elif defined(PARTIALS_PUT_FOURS)
+// part: as below.
+void put_four(uint slot, uint part, vec4 value) {
+    const uint window = partial_window(slot), at = 2u * slot + part;
+    if (WINDOW_INTERSECTIONS == 0u || window == 0u) partials0[at] = value;
+    else if (window == 1u) partials1[at] = value;
+    else if (window == 2u) partials2[at] = value;
+    else if (window == 3u) partials3[at] = value;
+    else partials4[at] = value;
 }
 #else
 // part: 0, the first four of an intersection's sums, or 1, the others.

@@ -193,8 +193,9 @@ TEST_F(PassSpirv, kernels_without_shapes_read_and_write_no_exponent) {
         std::set<int> bindings;  // those of shapes, exponents and their sums
     };
     for (const Pass& pass :
-         {Pass{"project", {7, 16}}, Pass{"blend", {10}}, Pass{"blend_backward", {16, 17}},
-          Pass{"blend_backward_team", {16, 17}}, Pass{"blend_backward_buckets", {14}},
+         {Pass{"project", {7, 16}}, Pass{"blend", {10}}, Pass{"blend_records", {10}},
+          Pass{"blend_backward", {16, 17}}, Pass{"blend_backward_team", {16, 17}},
+          Pass{"blend_backward_pixels", {16, 17}}, Pass{"blend_backward_buckets", {14}},
           Pass{"project_backward", {7, 14, 27}}, Pass{"densify_split", {5}},
           Pass{"relocate", {5}}}) {
         SCOPED_TRACE(pass.shader);

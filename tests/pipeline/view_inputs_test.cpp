@@ -39,8 +39,8 @@ void expect_gradients(const reference::Gradients& truth, const ViewGradients& vi
 }
 
 TEST(ViewInputs, a_loss_of_opacity_and_background_is_as_in_double) {
-    for (const BackwardBlend method :
-         {BackwardBlend::subgroup, BackwardBlend::team, BackwardBlend::buckets}) {
+    for (const BackwardBlend method : {BackwardBlend::subgroup, BackwardBlend::team,
+                                       BackwardBlend::buckets, BackwardBlend::pixels}) {
         Device& device = shared_device();
         const Tuning before = device.tuning();
         Tuning tuning = before;

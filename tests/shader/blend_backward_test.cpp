@@ -1,5 +1,5 @@
-// Every way of the backward blend alone, blend_backward.comp and those with _team and _buckets,
-// against the reference: one gradient for each splat-tile intersection.
+// Every way of the backward blend alone, blend_backward.comp and those with _team, _buckets and
+// _pixels, against the reference: one gradient for each splat-tile intersection.
 #include "tests/support/blend_scene.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/every_kernel.h"
@@ -187,7 +187,7 @@ TEST_P(BlendBackward, mean_on_a_pixel_centre_gives_finite_gradients) {
     expect_backward_matches(scene, allowed());
 }
 
-INSTANTIATE_TEST_SUITE_P(every_kernel, BlendBackward, testing::ValuesIn(every_blend_variant()),
+INSTANTIATE_TEST_SUITE_P(every_kernel, BlendBackward, testing::ValuesIn(every_backward_variant()),
                          [](const auto& v) { return v.param.name(); });
 
 std::vector<BlendVariant> every_polynomial() {
@@ -201,7 +201,8 @@ INSTANTIATE_TEST_SUITE_P(every_kernel, ByBuckets, testing::ValuesIn(every_polyno
 
 INSTANTIATE_TEST_SUITE_P(BlendBackwardCases, EveryWay,
                          testing::Values(BackwardBlend::subgroup, BackwardBlend::team,
-                                         BackwardBlend::buckets),
+                                         BackwardBlend::buckets, BackwardBlend::pixels,
+                                         BackwardBlend::pixels4),
                          [](const auto& v) {
                              return kBackwardBlends[static_cast<size_t>(v.param)];
                          });

@@ -1,4 +1,5 @@
-// blend.comp alone against the blending of the reference, on splats set by hand.
+// blend.comp and blend_records.comp alone against the blending of the reference, on splats set by
+// hand.
 #include "engine/plan/tuning_names.h"
 #include "tests/support/blend_scene.h"
 #include "tests/support/compare_arrays.h"
@@ -90,19 +91,23 @@ TEST_P(Blend, clamped_layers_down_to_any_stop_are_shown) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(every_kernel, Blend, testing::ValuesIn(every_blend_variant()),
+INSTANTIATE_TEST_SUITE_P(every_kernel, Blend, testing::ValuesIn(every_forward_variant()),
                          [](const auto& v) { return v.param.name(); });
 
 const BlendVariant kCosine{KERNEL_RAISED_COSINE, Footprint::psi, EVALUATION_POLYNOMIAL};
 
 TEST(BlendCases, ten_thousand_thin_layers_match_double) {
-    BlendScene scene = kCosine.scene();
-    scene.cutoff = 1e-6f;  // else the transmittance stop ends a pixel after 2,300 layers
-    for (int i = 0; i < 10'000; ++i)
-        scene.add({8.5, 8.5}, {400, 0, 400}, 3e-4, {i % 7 / 7.0, i % 3 / 3.0, 0.5});
-    const Blended b = expect_blend_matches(scene, "image_thin_layers");
-    EXPECT_EQ(b.truth.contributions.at(8, 8, 0), 10'000);
-    EXPECT_EQ(b.got.last[8 * 16 + 8], 10'000U);
+    for (const bool records : {false, true}) {
+        SCOPED_TRACE(records);
+        BlendScene scene = kCosine.scene();
+        scene.records = records;
+        scene.cutoff = 1e-6f;  // else the transmittance stop ends a pixel after 2,300 layers
+        for (int i = 0; i < 10'000; ++i)
+            scene.add({8.5, 8.5}, {400, 0, 400}, 3e-4, {i % 7 / 7.0, i % 3 / 3.0, 0.5});
+        const Blended b = expect_blend_matches(scene, "image_thin_layers");
+        EXPECT_EQ(b.truth.contributions.at(8, 8, 0), 10'000);
+        EXPECT_EQ(b.got.last[8 * 16 + 8], 10'000U);
+    }
 }
 
 TEST(BlendCases, no_splats_leave_the_background) {
@@ -150,11 +155,57 @@ TEST(BlendCases, every_shape_of_workgroup_gives_the_same_picture) {
     EXPECT_GE(shapes.choices.size(), 3U);
     for (const std::string& shape : shapes.choices) {
         SCOPED_TRACE(shape);
-        scene.threads = static_cast<std::uint32_t>(std::stoul(shape));
+        scene.records = shape == "records";
+        scene.threads = scene.records ? 0 : static_cast<std::uint32_t>(std::stoul(shape));
         const BlendOutput out = blend_on_device(scene, lists);
         EXPECT_LE(largest_difference(out.image, usual.image), 2e-6);
         EXPECT_LE(largest_difference(out.transmittance, usual.transmittance), 2e-6);
     }
+}
+
+// Before a block's first end nothing is tested; the batch with that end is blended a second time.
+TEST(BlendCases, records_end_every_pixel_where_the_other_form_does) {
+    for (const double opacity : {0.3, 0.9, 0.999}) {
+        SCOPED_TRACE(opacity);
+        BlendScene scene = kCosine.scene(53, 37);
+        scene.add_random(1200, 9, 0.01, opacity);
+        const reference::TileLists lists = scene.lists();
+        const BlendOutput usual = blend_on_device(scene, lists);
+        scene.records = true;
+        const BlendOutput out = blend_on_device(scene, lists);
+        EXPECT_EQ(out.last, usual.last);
+        EXPECT_LE(largest_difference(out.image, usual.image), 2e-6);
+        EXPECT_LE(largest_difference(out.transmittance, usual.transmittance), 2e-6);
+        const auto [first, last] = std::minmax_element(out.last.begin(), out.last.end());
+        if (opacity > 0.9) {
+            EXPECT_LT(*first, *last) << "no pixel ends before another";
+        }
+    }
+}
+
+TEST(BlendCases, records_keep_the_sum_of_depths) {
+    BlendScene scene = kCosine.scene(53, 37);
+    scene.records = scene.depth_sum = true;
+    scene.add_random(900, 4, 0.01, 0.9);
+    for (auto& s : scene.splats) s.depth = 1 + s.depth / 256;
+    const reference::TileLists lists = scene.lists();
+    const reference::BlendImages<double> truth = blend_in_double(scene, lists);
+    const std::vector<float> image = blend_on_device(scene, lists).image;
+    EXPECT_TRUE(
+        compare("sum w z", truth.depth.data,
+                std::vector<float>(image.begin() + std::ptrdiff_t{3} * 53 * 37, image.end()),
+                tolerance("image_float32")));
+}
+
+TEST(BlendCases, a_second_run_by_records_gives_the_same_bits) {
+    BlendScene scene = kCosine.scene(53, 37);
+    scene.records = true;
+    scene.add_random(700, 4, 0.01, 1);
+    const reference::TileLists lists = scene.lists();
+    const BlendOutput one = blend_on_device(scene, lists), two = blend_on_device(scene, lists);
+    EXPECT_EQ(one.image, two.image);
+    EXPECT_EQ(one.transmittance, two.transmittance);
+    EXPECT_EQ(one.last, two.last);
 }
 
 TEST(BlendCases, checkpoints_change_no_bit) {
@@ -195,8 +246,9 @@ TEST(BlendCases, a_list_that_shows_nothing_changes_no_bit) {
 }
 
 TEST(BlendCases, lists_worked_off_in_parts_change_no_bit) {
-    for (const bool store : {true, false}) {
+    for (const auto& [store, records] : {std::pair{true, false}, {false, false}, {true, true}}) {
         BlendScene scene = kCosine.scene(53, 37);
+        scene.records = records;
         scene.add_random(2000, 4, 0.01, 0.3);
         const reference::TileLists lists = scene.lists();
         const std::vector<float> whole = blend_on_device(scene, lists, store).image;

@@ -27,6 +27,7 @@ struct BlendScene {
     glm::vec3 background{0.0f};
     std::uint32_t segment = 0;  // intersections of a list a dispatch; 0: all
     std::uint32_t threads = 0;  // in a workgroup of blend.comp; 0: one subgroup per block
+    bool records = false;       // blend_records.comp in its place
     BackwardBlend back = BackwardBlend::subgroup;
     bool depth_sum = false;  // as ForwardOptions: d_image has five planes
     std::vector<reference::ProjectedSplat<double>> splats;  // nearest first
@@ -94,10 +95,17 @@ struct BlendVariant {
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
     int evaluation = EVALUATION_POLYNOMIAL;
+    bool records = false;  // forward
+    BackwardBlend back = BackwardBlend::subgroup;
 
     std::string name() const {
-        return std::string(kernel_name(kernel)) + "_" + std::string(footprint_name(footprint)) +
-               (evaluation == EVALUATION_BUILTIN ? "_builtin" : "");
+        std::string text =
+            std::string(kernel_name(kernel)) + "_" + std::string(footprint_name(footprint));
+        if (evaluation == EVALUATION_BUILTIN) text += "_builtin";
+        if (records) text += "_records";
+        if (back != BackwardBlend::subgroup)
+            text += std::string("_") + kBackwardBlends[static_cast<size_t>(back)];
+        return text;
     }
     /// Exact footprints of the kernels with a jump fall like a root at their edge: the slope there
     /// grows without bound, and a rounding of q is a percent of it.
@@ -113,6 +121,8 @@ struct BlendVariant {
         s.kernel = kernel;
         s.footprint = footprint;
         s.evaluation = evaluation;
+        s.records = records;
+        s.back = back;
         s.background = {0.1f, 0.5f, 0.9f};
         return s;
     }
@@ -135,6 +145,29 @@ inline std::vector<BlendVariant> every_blend_variant() {
         all.push_back({kernel, Footprint::psi, EVALUATION_BUILTIN});
     for (const int kernel : shaped_kernels())
         all.push_back({kernel, Footprint::psi, EVALUATION_POLYNOMIAL});
+    return all;
+}
+
+/// In every form of the forward blend.
+inline std::vector<BlendVariant> every_forward_variant() {
+    std::vector<BlendVariant> all = every_blend_variant();
+    for (BlendVariant v : every_blend_variant()) {
+        v.records = true;
+        all.push_back(v);
+    }
+    return all;
+}
+
+/// By one subgroup and by pixels, whose code for kernels is not the other's.
+inline std::vector<BlendVariant> every_backward_variant() {
+    std::vector<BlendVariant> all = every_blend_variant();
+    for (const BackwardBlend back : {BackwardBlend::pixels, BackwardBlend::pixels4})
+        for (BlendVariant v : every_blend_variant()) {
+            const bool gaussian = v.kernel == KERNEL_GAUSSIAN || v.kernel == KERNEL_GES_PUBLISHED;
+            if (back == BackwardBlend::pixels4 && !gaussian) continue;  // of 4 in any case
+            v.back = back;
+            all.push_back(v);
+        }
     return all;
 }
 
@@ -206,24 +239,28 @@ struct BlendPipelines {
         constants["DEPTH_SUM"] = constants["ALPHA_GRADIENT"] = scene.depth_sum ? 1 : 0;
         constants["BUCKET"] = static_cast<std::int32_t>(bucket);
         constants = for_several_passes(constants);
-        const bool team = scene.back == BackwardBlend::team;
-        constants["THREADS"] = static_cast<std::int32_t>(team ? 4 * subgroup : subgroup);
-        backward = Pipeline(device,
-                            scene.buckets() ? "blend_backward_buckets"
-                            : team          ? "blend_backward_team"
-                                            : "blend_backward",
-                            constants, true, subgroup);
+        const bool several = writes_every_slot(scene.back);
+        constants["THREADS"] = static_cast<std::int32_t>(several ? 4 * subgroup : subgroup);
+        constants["BATCH"] = scene.back == BackwardBlend::pixels4 ? 4 : 8;
+        constants = for_several_passes(constants);
+        backward = Pipeline(device, back_shader(scene.back), constants, true, subgroup);
         const std::uint32_t threads = scene.threads > 0 ? scene.threads : subgroup * 4;
         constants["THREADS"] = static_cast<std::int32_t>(threads);
         constants["PIXELS"] = static_cast<std::int32_t>(256 / threads);
         constants["STORE_FOR_BACKWARD"] = store ? 1 : 0;
         constants["CHECKPOINTS"] = scene.buckets() ? 1 : 0;
         constants["MIN_TRANSMITTANCE"] = least_transmittance(scene.stop);
-        blend = Pipeline(device, "blend", constants, true, subgroup);
+        blend =
+            Pipeline(device, scene.records ? "blend_records" : "blend", constants, true, subgroup);
         constants = for_several_passes(constants);
         constants["THREADS"] = SPLAT_GROUP;
         bucket_tiles = Pipeline(device, "bucket_tiles", constants);
         bucket_behind = Pipeline(device, "bucket_behind", constants);
+    }
+    static const char* back_shader(BackwardBlend back) {
+        if (is_by_pixels(back)) return "blend_backward_pixels";
+        if (back == BackwardBlend::buckets) return "blend_backward_buckets";
+        return back == BackwardBlend::team ? "blend_backward_team" : "blend_backward";
     }
 };
 
@@ -246,7 +283,7 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
                  intersections = lists.intersection_count();
     const size_t more = scene.depth_sum ? 1 : 0;  // planes, and sums of an intersection
     const size_t records = intersections / pipelines.bucket + lists.tile_count();
-    const float start = scene.back == BackwardBlend::team ? NAN : 0.0f;
+    const float start = writes_every_slot(scene.back) ? NAN : 0.0f;
     // A record that no pixel reaches must not be read: NaN would show.
     const std::vector<float> unwritten(scene.buckets() ? records * 256 * (4 + more) : 1, NAN);
     const GuardedBuffer ranges(device, "tile range", shuffled.ranges),
@@ -258,7 +295,6 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
         behind(device, "behind", scene.segment > 0 ? pixels * 4 : 4),
         last(device, "last intersection", store ? pixels * 4 : 4),
         d_images(device, "d_image", d_image),
-        // A team writes every slot.
         partials(device, "partials", std::vector<float>(intersections * 8, start)),
         rest(device, "partial rest", std::vector<float>(intersections * (1 + more), start)),
         exponents(device, "exponent", exponent),

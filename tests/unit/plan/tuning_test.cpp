@@ -119,16 +119,49 @@ TEST(Tuning, lanes_are_a_choice_where_the_device_has_several_sizes) {
 TEST(Tuning, shapes_are_those_that_fit_the_device) {
     using Names = std::vector<std::string>;
     DeviceInfo info = some_gpu();
-    EXPECT_EQ(choices(info, "blend"), (Names{"128x2", "256x1", "64x4", "32x8"}));
+    EXPECT_EQ(choices(info, "blend"), (Names{"128x2", "256x1", "64x4", "32x8", "records"}));
     info.subgroup_size = 64;
-    EXPECT_EQ(choices(info, "blend"), (Names{"256x1", "128x2", "64x4"}));
+    EXPECT_EQ(choices(info, "blend"), (Names{"256x1", "128x2", "64x4", "records"}));
     info.subgroup_size = 4;  // a subgroup's list takes a kilobyte
     info.shared_memory_bytes = 32 * 1024;
-    EXPECT_EQ(choices(info, "blend"), (Names{"16x16", "128x2", "64x4", "32x8"}));
+    EXPECT_EQ(choices(info, "blend"), (Names{"16x16", "128x2", "64x4", "32x8", "records"}));
     EXPECT_EQ(choices(info, "scatter").front(), "ballot");
     info.driver = "llvmpipe Mesa 25";
     EXPECT_EQ(choices(info, "scatter").front(), "columns");
     EXPECT_TRUE(is_known_device(info));
+}
+
+TEST(Tuning, sums_by_pixels_need_subgroups_of_32_lanes_or_fewer_and_shared_memory) {
+    using Names = std::vector<std::string>;
+    DeviceInfo info = some_gpu();
+    const Names all{"team", "subgroup", "buckets", "pixels", "pixels4"};
+    EXPECT_EQ(choices(info, "backward"), all);
+    EXPECT_EQ(lanes_by_pixels(info, 32), 32U);
+    info.subgroup_size = info.max_subgroup_size = 64;  // as an RX 7900, which has both
+    EXPECT_EQ(choices(info, "backward"), all);
+    EXPECT_EQ(lanes_by_pixels(info, 64), 32U);
+    info.min_subgroup_size = 64;  // as Vega
+    EXPECT_EQ(choices(info, "backward"), (Names{"team", "subgroup", "buckets"}));
+    info = some_gpu();
+    info.shared_memory_bytes = 16 * 1024;
+    EXPECT_EQ(choices(info, "backward"), (Names{"team", "subgroup", "buckets"}));
+    EXPECT_THROW(parse_tuning(info, "backward=pixels", "--tune"), Error);
+}
+
+TEST(Tuning, a_run_that_blends_by_records_says_so_and_keeps_it) {
+    Device& device = shared_device();
+    EXPECT_EQ(result_tuning(device).find("blend"), std::string::npos);
+    std::string text;
+    {
+        const ScopedVariants some(device, "blend=records");
+        EXPECT_EQ(tuning_names(device.tuning()).at("blend"), "records");
+        text = result_tuning(device);
+    }
+    EXPECT_NE(text.find("blend=records"), std::string::npos) << text;
+    EXPECT_TRUE(resumed_tuning(device.info(), device.tuning(), text, "file").blend_records);
+    Tuning records = device.tuning();
+    records.blend_records = true;
+    EXPECT_FALSE(resumed_tuning(device.info(), records, "backward=subgroup", "file").blend_records);
 }
 
 TEST(Tuning, a_device_runs_its_defaults_until_it_is_told_otherwise) {

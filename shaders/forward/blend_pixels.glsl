@@ -1,0 +1,31 @@
+// The pixels of a thread in the forward blends, and one sample on one of them. Needs forward/blend_interface.glsl.
+
+struct Pixels {
+    float transmittance[PIXELS];  // negative once the pixel has ended
+    vec3 colour[PIXELS];
+    uint last[PIXELS];  // 1 + the last intersection looked at while it was alive; 0: none
+};
+
+// Light of the current bucket; not in Pixels, so that nothing of it is left without checkpoints. So are depths.
+const uint BUCKET_COLOURS = CHECKPOINTS == 1 ? PIXELS : 1u;
+vec3 bucket_colour[BUCKET_COLOURS];
+const uint DEPTHS = DEPTH_SUM == 1 ? PIXELS : 1u, BUCKET_DEPTHS = CHECKPOINTS == 1 ? DEPTHS : 1u;
+float depth_sum[DEPTHS], bucket_depth[BUCKET_DEPTHS];
+
+vec3 load_depth(uint splat) {  // z and its slope
+    const vec4 bound = splat_bound[splat];
+    return vec3(bound.z, unpackHalf2x16(floatBitsToUint(bound.w)));
+}
+
+void blend_sample(inout Pixels px, uint k, float alpha, vec3 colour, float depth, uint number) {
+    const float before = px.transmittance[k];
+    const float wanted = alpha * before;
+    const float next = before - wanted;
+    const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for what has ended
+    px.colour[k] += (goes_on ? wanted : 0.0) * colour;
+    if (CHECKPOINTS == 1) bucket_colour[k] += (goes_on ? wanted : 0.0) * colour;
+    if (DEPTH_SUM == 1) depth_sum[k] += (goes_on ? wanted : 0.0) * depth;
+    if (DEPTH_SUM == 1 && CHECKPOINTS == 1) bucket_depth[k] += (goes_on ? wanted : 0.0) * depth;
+    px.transmittance[k] = mix(-abs(before), next, goes_on);
+    if (STORE_FOR_BACKWARD == 1) px.last[k] = goes_on ? number : px.last[k];
+}

@@ -1,0 +1,122 @@
+// The form `records` of blend.comp, for devices where an instruction more or less counts: splats from shared memory
+// (lib/records.glsl), and no test of ends before the first pixel of the block ends. Place: last pass of the forward walk.
+// Work: one workgroup a tile, one subgroup a block of it. A batch of as many splats as there are lanes is blended without
+// looking for ends. As transmittance only falls, no pixel ended in it if all are at or above the stop afterwards; else the
+// block goes on from before the batch with blend.comp's tests, to the end of its list. The same decisions either way.
+// Shared memory: a subgroup's own lists and records; no barrier. Reads and writes what blend.comp does; leaves no
+// checkpoints and does not resort by DEPTH_ORDER_PIXEL.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_vote : require
+
+#include "forward/blend_interface.glsl"
+const uint RECORDS = AREAS * SUBGROUP_SIZE;
+#include "lib/records.glsl"
+#include "forward/blend_pixels.glsl"
+
+float alpha_of(Record r, vec2 offset) {
+    float w, slope, by_exponent;
+    const float raw = min(record_alpha(r, offset, w, slope, by_exponent), ALPHA_MAX);
+    return mix(0.0, raw, raw >= ALPHA_CUTOFF);
+}
+
+// A batch of `count` records, none of whose pixels had ended before; false, and px as it was, where one ends in it.
+bool blend_without_ends(inout Pixels px, uint count, vec2 offset) {
+    float transmittance[PIXELS], depths[DEPTHS];
+    vec3 colour[PIXELS];
+    for (uint k = 0u; k < PIXELS; ++k) {
+        transmittance[k] = px.transmittance[k];
+        colour[k] = px.colour[k];
+        if (DEPTH_SUM == 1) depths[k] = depth_sum[k];
+    }
+    uint at = records_base(), turn = 0u, number = 0u;
+    do {
+        const Record r = load_record(at);
+        [[unroll]] for (uint k = 0u; k < PIXELS; ++k) {  // a loop would count on lavapipe: LIST_SEGMENT
+            const float share = alpha_of(r, offset + vec2(slot_offset(k))) * transmittance[k];
+            colour[k] += share * r.colour;
+            if (DEPTH_SUM == 1) depths[k] += share * r.depth;
+            transmittance[k] -= share;
+        }
+        number = r.number;
+        at += RECORD;
+    } while (++turn < count);
+    float least = transmittance[0];
+    for (uint k = 1u; k < PIXELS; ++k) least = min(least, transmittance[k]);
+    const bool ended = subgroupAny(least < MIN_TRANSMITTANCE);
+    for (uint k = 0u; k < PIXELS; ++k) {
+        px.transmittance[k] = ended ? px.transmittance[k] : transmittance[k];
+        px.colour[k] = ended ? px.colour[k] : colour[k];
+        if (DEPTH_SUM == 1) depth_sum[k] = ended ? depth_sum[k] : depths[k];
+        if (STORE_FOR_BACKWARD == 1) px.last[k] = ended ? px.last[k] : number;
+    }
+    return !ended;
+}
+
+void blend_with_ends(inout Pixels px, uint count, vec2 offset) {
+    uint at = records_base(), turn = 0u;
+    do {
+        const Record r = load_record(at);
+        [[unroll]] for (uint k = 0u; k < PIXELS; ++k)
+            blend_sample(px, k, alpha_of(r, offset + vec2(slot_offset(k))), r.colour, r.depth, r.number);
+        at += RECORD;
+    } while (++turn < count);
+}
+
+// All collected splats in order, at least one; false when every pixel has ended. any_ended: a pixel has ended.
+bool blend_hits(inout Pixels px, inout bool any_ended, vec2 centre, uint count) {
+    const vec2 offset = first_offset();
+    float alive = 1.0;
+    uint batch = 0u;
+    do {  // ends at its bottom, as those within: see emit_cells
+        const uint mine = batch + gl_SubgroupInvocationID;
+        order_within_subgroup();  // the records may still be read
+        if (mine < count)
+            store_record(records_base() + gl_SubgroupInvocationID * RECORD,
+                         make_record(hit_splat[hits_base() + mine], hit_index[hits_base() + mine] + 1u, centre));
+        order_within_subgroup();
+        const uint size = min(SUBGROUP_SIZE, count - batch);
+        if (!any_ended) any_ended = !blend_without_ends(px, size, offset);
+        if (any_ended) blend_with_ends(px, size, offset);
+        alive = px.transmittance[0];
+        for (uint k = 1u; k < PIXELS; ++k) alive = max(alive, px.transmittance[k]);
+        batch += SUBGROUP_SIZE;
+    } while (batch < count && subgroupAny(alive >= 0.0));
+    return subgroupAny(alive > 0.0);
+}
+
+#include "forward/blend_state.glsl"
+
+void main() {
+    const uvec2 tile = gl_WorkGroupID.xy;
+    const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
+    const uint bits = area_bits(gl_SubgroupID);
+    const uvec2 first = tile * TILE_SIZE + first_pixel(gl_SubgroupID, gl_SubgroupInvocationID);
+    const vec2 centre = block_centre(tile, gl_SubgroupID);
+
+    Pixels px;
+    for (uint k = 0u; k < PIXELS; ++k) {
+        const uvec2 at = first + slot_offset(k);
+        px.transmittance[k] = at.x < args.width && at.y < args.height ? 1.0 : -1.0;
+        px.colour[k] = vec3(0.0);
+        px.last[k] = 0u;
+        if (DEPTH_SUM == 1) depth_sum[k] = 0.0;
+    }
+    if (SEGMENT > 0u && args.segment > 0u) load(px, first);
+    float least = px.transmittance[0];
+    for (uint k = 1u; k < PIXELS; ++k) least = min(least, px.transmittance[k]);
+    bool any_ended = subgroupAny(least < 0.0);  // or lies beside the picture
+    if (range.x < range.y) {
+        uint chunk = range.x;
+        bool alive = true;
+        do {
+            const uint count = collect_hits(chunk, min(chunk + CHUNK, range.y), bits);
+            if (count > 0u) alive = blend_hits(px, any_ended, centre, count);
+            chunk += CHUNK;
+        } while (alive && chunk < range.y);
+    }
+    store(px, first);
+}
