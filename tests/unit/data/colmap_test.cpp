@@ -356,7 +356,7 @@ TEST(ColmapProject, remedies_that_errors_name_work_as_typed) {
         write_file_atomic(folder / "t.json", text(value));
         error = error_of([&] { load_dataset(folder / "t.json"); });
         const std::string told = key == "integer_depth_scale"       ? after(error, "step: ")
-                                 : key == "depth_unit_scale_factor" ? after(error, "step, as ")
+                                 : key == "depth_unit_scale_factor" ? after(error, "step, such as ")
                                                                     : "60";
         write_file_atomic(folder / "t.json", text(told));
         EXPECT_EQ(load_dataset(folder / "t.json").views.size(), 1u) << told;
