@@ -4,15 +4,16 @@
 
 namespace darb {
 
-Canvas::Canvas(Device& device) : device_(&device), commands_(device) {
+Canvas::Canvas(Device& device)
+    : device_(&device), turns_{Turn{Commands(device), {}}, Turn{Commands(device), {}}} {
     if (!device.queue_has_graphics())
         throw Error(device.info().name, "has no graphics queue, which the window's panels need",
                     "Choose another device (darb devices), or use darb render.");
     create_render_pass();
 }
 
-// Nothing is in flight: who submits, waits.
 Canvas::~Canvas() {
+    finish_quietly(*device_);
     vkDestroyFramebuffer(device_->handle(), framebuffer_, nullptr);
     vkDestroyRenderPass(device_->handle(), render_pass_, nullptr);
 }
@@ -40,8 +41,14 @@ void Canvas::create_render_pass() {
     check_vulkan(vkCreateRenderPass(device_->handle(), &info, nullptr, &render_pass_), "window");
 }
 
+void Canvas::begin_frame() {
+    turn_ = (turn_ + 1) % turns_.size();
+    commands().wait();
+}
+
 void Canvas::resize(int width, int height) {
     if (width == image_.width() && height == image_.height()) return;
+    device_->wait_idle();
     vkDestroyFramebuffer(device_->handle(), framebuffer_, nullptr);
     framebuffer_ = VK_NULL_HANDLE;
     image_ = DeviceImage();
@@ -60,40 +67,41 @@ void Canvas::resize(int width, int height) {
 }
 
 void Canvas::begin(const BufferPicture& picture, const glm::vec3& colour) {
-    commands_.begin();
-    commands_.pass("window");
+    DeviceImage& unscaled = turns_[turn_].unscaled;
+    commands().pass("window");
     if (picture.pixels == nullptr || !*picture.pixels || picture.width == 0) {
-        commands_.clear(image_, {colour.r, colour.g, colour.b, 1.0f});
+        commands().clear(image_, {colour.r, colour.g, colour.b, 1.0f});
     } else if (picture.width == width() && picture.height == height()) {
-        commands_.copy(*picture.pixels, image_);
+        commands().copy(*picture.pixels, image_);
     } else {
         // Exactly as large as the picture: a linear filter reads to the image's edge.
-        if (unscaled_.width() != picture.width || unscaled_.height() != picture.height)
-            unscaled_ =
+        if (unscaled.width() != picture.width || unscaled.height() != picture.height)
+            unscaled =
                 DeviceImage(*device_, "picture", picture.width, picture.height, kCanvasFormat);
-        commands_.copy(*picture.pixels, unscaled_);
-        commands_.copy(unscaled_, image_, VK_FILTER_LINEAR);
+        commands().copy(*picture.pixels, unscaled);
+        commands().copy(unscaled, image_, VK_FILTER_LINEAR);
     }
-    commands_.change_layout(image_, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL);
+    commands().change_layout(image_, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL);
     VkRenderPassBeginInfo pass{};
     pass.sType = VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO;
     pass.renderPass = render_pass_;
     pass.framebuffer = framebuffer_;
     pass.renderArea.extent = {static_cast<std::uint32_t>(width()),
                               static_cast<std::uint32_t>(height())};
-    vkCmdBeginRenderPass(commands_.handle(), &pass, VK_SUBPASS_CONTENTS_INLINE);
+    vkCmdBeginRenderPass(commands().handle(), &pass, VK_SUBPASS_CONTENTS_INLINE);
 }
 
 void Canvas::end() {
-    vkCmdEndRenderPass(commands_.handle());
+    vkCmdEndRenderPass(commands().handle());
 }
 
 ImageU8 Canvas::read_back() {
     const size_t pixels = size_t(width()) * size_t(height());
     const Buffer host(*device_, "screenshot", pixels * 4, Memory::host);
-    commands_.begin();
-    commands_.copy(image_, host);
-    commands_.submit_and_wait();
+    begin_frame();
+    commands().begin();
+    commands().copy(image_, host);
+    commands().submit_and_wait();
     ImageU8 image(width(), height(), 3);
     const auto* bgra = static_cast<const std::uint8_t*>(host.mapped());
     for (size_t p = 0; p < pixels; ++p)

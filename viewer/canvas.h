@@ -1,9 +1,14 @@
 // Canvas: the image of a window's whole content, the scene's picture with the panels drawn over
 // it; then given to a swapchain or read back. Needs a queue with graphics.
+//
+// Two frames may be under way. They share the image, in the order of the queue; commands, and the
+// memory that Dear ImGui writes for them, are of each frame.
 #pragma once
 
 #include <vulkan/vulkan.h>
 
+#include <array>
+#include <exception>
 #include <glm/glm.hpp>
 
 #include "engine/core/image.h"
@@ -13,6 +18,17 @@
 namespace darb {
 
 inline constexpr VkFormat kCanvasFormat = VK_FORMAT_B8G8R8A8_UNORM;
+
+/// Frames that the host has given to the device and that may not be done.
+inline constexpr int kFramesUnderWay = 2;
+
+/// For destructors: a device that is lost has nothing under way.
+inline void finish_quietly(const Device& device) noexcept {
+    try {
+        device.wait_idle();
+    } catch (const std::exception&) {
+    }
+}
 
 /// A picture in a buffer: B8G8R8A8 [height][width]. Without a buffer there is none.
 struct BufferPicture {
@@ -32,21 +48,28 @@ class Canvas {
     int width() const { return image_.width(); }
     int height() const { return image_.height(); }
 
+    /// A frame begins: waits for the one before the last. What the host keeps for a frame may be
+    /// used again then. Throws DeviceLost.
+    void begin_frame();
     /// Makes it this large, in px; the picture before is lost when the size changes.
     void resize(int width, int height);
 
-    /// Starts a recording: the picture, scaled to the canvas where its size differs, or this colour
-    /// where there is none; then `draw` inside the render pass. The caller runs it.
-    template <class Draw>
-    void compose(const BufferPicture& picture, const glm::vec3& colour, const Draw& draw) {
+    /// Starts a recording: what `first` records; the picture, scaled to the canvas where its size
+    /// differs, or this colour where there is none; then `draw` inside the render pass. The caller
+    /// runs it.
+    template <class First, class Draw>
+    void compose(const BufferPicture& picture, const glm::vec3& colour, const First& first,
+                 const Draw& draw) {
+        commands().begin();
+        first(commands());
         begin(picture, colour);
-        draw(commands_.handle());
+        draw(commands().handle());
         end();
     }
     /// What compose recorded, and what others add to it.
-    Commands& commands() { return commands_; }
+    Commands& commands() { return turns_[turn_].commands; }
     DeviceImage& image() { return image_; }
-    void submit_and_wait() { commands_.submit_and_wait(); }
+    void submit_and_wait() { commands().submit_and_wait(); }
 
     /// The composed image as RGB. Waits.
     ImageU8 read_back();
@@ -59,8 +82,13 @@ class Canvas {
     Device* device_;
     VkRenderPass render_pass_ = VK_NULL_HANDLE;
     VkFramebuffer framebuffer_ = VK_NULL_HANDLE;
-    Commands commands_;
-    DeviceImage image_, unscaled_;
+    struct Turn {
+        Commands commands;
+        DeviceImage unscaled;
+    };
+    std::array<Turn, kFramesUnderWay> turns_;
+    std::size_t turn_ = 0;
+    DeviceImage image_;
 };
 
 }  // namespace darb

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "engine/gpu/commands.h"
+#include "viewer/canvas.h"
 #include "viewer/gui_font.h"
 #include "viewer/theme.h"
 
@@ -74,7 +75,7 @@ void Gui::start_backend() {
     info.Queue = device_->queue();
     info.PipelineCache = device_->pipeline_cache();
     info.DescriptorPool = pool_;
-    info.MinImageCount = info.ImageCount = 2;
+    info.MinImageCount = info.ImageCount = kFramesUnderWay;  // sets of what it writes
     info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
     info.CheckVkResultFn = check_gui;
     ImGui_ImplVulkan_Init(&info, render_pass_);
@@ -129,7 +130,7 @@ void Gui::upload_fonts() {
 }
 
 Gui::~Gui() {
-    device_->wait_idle();
+    finish_quietly(*device_);
     ImGui_ImplVulkan_Shutdown();
     if (window_ != nullptr) ImGui_ImplGlfw_Shutdown();
     ImGui::DestroyContext();

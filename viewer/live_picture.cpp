@@ -89,15 +89,17 @@ LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish, bool wh
         read_photo(wish, made);
         const auto start = LiveClock::now();
         const Camera camera = at_scale(wish.key.camera, made.quality.scale);
-        const bool panes = panes_.render_all(
-            picture_, camera, pane_displays(wish.key.display, wish.key.kernels_beside),
-            overlay_of(photos_, camera, wish.area), photo_beside(photos_, wish.key.display),
-            whole ? std::nullopt : std::optional(made.quality.splats));
-        compiled_ = panes ? panes_.compiled() : picture_.compiled();
+        const PaneWish pictures{camera, pane_displays(wish.key.display, wish.key.kernels_beside),
+                                overlay_of(photos_, camera, wish.area),
+                                photo_beside(photos_, wish.key.display),
+                                whole ? std::nullopt : std::optional(made.quality.splats)};
+        const bool panes = pictures.several();
+        panes_.render(picture_, pictures);
+        compiled_ = panes_.compiled();
         if (panes) {
             Panes layout = wish.panes;
             fit_lines(panes_.count(), layout, compared_strip(photos_, wish.key.display, wish.area));
-            panes_.compose(layout);
+            panes_.compose(layout, whole);
             if (whole) made.psnr_db = panes_.psnr_db();
         }
         made.width = camera.width;
@@ -105,7 +107,7 @@ LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish, bool wh
         made.pixels =
             (panes ? panes_.pixels() : picture_.pixels())
                 .download<std::uint32_t>(std::size_t(camera.width) * std::size_t(camera.height));
-        made.passes = panes ? panes_.pass_times() : picture_.pass_times();
+        made.passes = panes_.pass_times();
         made.visible = picture_.status().visible;
         made.intersections = picture_.status().intersections;
         made.ms = seconds_since(start) * 1000;

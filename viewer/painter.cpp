@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -19,13 +20,27 @@ constexpr std::size_t kFewSplats = 20'000;  // half of them are always drawn
 constexpr double kQuick_ms = 20;            // it will be drawn in motion, too
 constexpr size_t kTimesKept = 60;           // frames in motion that the panel averages over
 constexpr int kRehearsals = 9;              // of motion; the first compiles
-constexpr double kRehearsing_ms = 40;       // of a frame: the window is to answer meanwhile
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
     return 1000 * seconds_since(start);
 }
 
+double sum_ms(const std::vector<PassTime>& passes) {
+    double sum = 0;
+    for (const PassTime& pass : passes) sum += pass.ms;
+    return sum;
+}
+
 }  // namespace
+
+void LivePixels::set(Device& device, const LiveMade& made) {
+    if (std::exchange(composed, false)) at = (at + 1) % buffers.size();
+    const std::uint64_t bytes = made.pixels.size() * 4;
+    if (buffers[at].bytes() < bytes)
+        buffers[at] = Buffer(device, "live picture", bytes, Memory::host);
+    std::memcpy(buffers[at].mapped(), made.pixels.data(), bytes);
+    size = {made.width, made.height};
+}
 
 Painter::Painter(Device& device, Session& session, PainterOptions options, GLFWwindow* window)
     : device_(&device),
@@ -36,10 +51,14 @@ Painter::Painter(Device& device, Session& session, PainterOptions options, GLFWw
       picture_(device),
       panes_(device) {}
 
-Painter::~Painter() = default;
+Painter::~Painter() {
+    finish_quietly(*device_);
+}
 
 void Painter::open(const Scene& scene) {
     picture_.set_scene(scene.model, scene.bounds, scene.important);
+    under_way_.clear();
+    psnr_at_ = 0;
     warm_up_.reset();
     lose_scene("another scene was opened");
     begin_motion();
@@ -56,18 +75,18 @@ void Painter::begin_motion() {
 // Until the warm-up is over the run's last picture stays, and the window lives.
 void Painter::begin_scene(bool of_run) {
     constexpr int kSize = 256;  // px
-    if (of_run && options_.second_device && live_size_.x > 0)
+    if (of_run && options_.second_device && live_.size.x > 0)
         warm_up_ = std::make_unique<WarmUp>(
             *device_, *options_.second_device, session_->scene->model, shown_displays(),
             session_->navigation.camera(kSize, kSize), options_.wake);
     else
-        live_size_ = {0, 0};
+        live_.size = {0, 0};
 }
 
 void Painter::end_warm_up() {
     warm_pipelines_ = warm_up_->take_pipelines();
     warm_up_.reset();
-    live_size_ = {0, 0};
+    live_.size = {0, 0};
     pacing_.forget();
 }
 
@@ -114,10 +133,7 @@ void Painter::begin_run() {
 
 void Painter::show_picture_of_run(const LiveMade& made) {
     if (made.pixels.empty()) return;
-    if (live_pixels_.bytes() < made.pixels.size() * 4)
-        live_pixels_ = Buffer(*device_, "live picture", made.pixels.size() * 4);
-    live_pixels_.upload(made.pixels);
-    live_size_ = {made.width, made.height};
+    live_.set(*device_, made);
     session_->panes.psnr_db = made.psnr_db;
     FrameTimes& t = session_->times;
     t.passes = made.passes;
@@ -130,6 +146,11 @@ void Painter::show_picture_of_run(const LiveMade& made) {
 
 void Painter::begin(int width, int height) {
     frame_start_ = Clock::now();
+    ++frame_;
+    canvas_.begin_frame();
+    picture_.finish(frame_ - kFramesUnderWay);
+    take_results();
+    take_psnr();
     take_levels();
     if (warm_up_ && warm_up_->done()) end_warm_up();
     if (at_rest()) warm_pipelines_.clear();  // the pictures have them
@@ -146,18 +167,34 @@ void Painter::paint(const PaintedFrame& frame) {
 }
 
 double Painter::seconds_to_next() {
+    if (!under_way_.empty() || psnr_at_ > 0) return 0;
+    if (pacing_.missed() && !picture_.empty()) return 0;
     if (pacing_.rehearses() && rehearsals_ > 0) return 0;
     const double refine_s = pacing_.seconds_to_refine(frame_start_);
     if (!picture_.empty() && std::isfinite(refine_s)) return refine_s;
     return pacing_.count_still_frame();
 }
 
+bool Painter::refined() const {
+    return pacing_.refined() && std::none_of(under_way_.begin(), under_way_.end(),
+                                             [](const Started& s) { return s.refines; });
+}
+
 bool Painter::at_rest() const {
-    return !warm_up_ && pacing_.is_whole() && ready_to_move() && rehearsals_ == 0;
+    return !warm_up_ && under_way_.empty() && pacing_.is_whole() && ready_to_move() &&
+           rehearsals_ == 0;
 }
 
 void Painter::compose() {
-    canvas_.compose(shown(), session_->display.background,
+    const auto strips = [this](Commands& commands) {
+        if (shows_panes_) panes_.record(commands, session_->panes);
+        if (std::exchange(copies_wanted_, false)) {
+            panes_.record_copies(commands);
+            psnr_at_ = frame_ + kFramesUnderWay;
+        }
+    };
+    live_.composed = true;
+    canvas_.compose(shown(), session_->display.background, strips,
                     [this](VkCommandBuffer commands) { gui_.draw(commands); });
 }
 
@@ -220,13 +257,13 @@ void Painter::pace_picture(const PaintedFrame& frame, bool works) {
     const PicturePacing::Frame paced{
         frame.full, works,
         session_->times.full_ms > kLong_ms && picture_.most_moving() < 1 && ready_to_move(),
-        session_->error.empty() && rehearsals_ > 0};
+        session_->error.empty() && rehearsals_ > 0 && under_way_.empty()};
     const PictureStep step = pacing_.next(key, paced, frame_start_);
     if (step == PictureStep::rehearsal)
         rehearse_motion(key);
     else if (step != PictureStep::none)
-        draw_picture(key, step);
-    compose_panes();
+        draw_picture(key, step, frame.full);
+    fit_panes();
     if (!works) start_levels();
 }
 
@@ -242,25 +279,21 @@ bool Painter::ready_to_move() const {
     return true;
 }
 
-void Painter::render_shown(const Camera& camera, const WindowArea& area,
-                           std::optional<double> moving) {
-    const std::vector<DisplaySettings> displays = shown_displays();
-    const bool photo_first = photo_beside(session_->photos, session_->display);
-    shows_panes_ = photo_first || displays.size() > 1;  // also where it fails
-    panes_.render_all(picture_, camera, displays, overlay_of(session_->photos, camera, area),
-                      photo_first, moving);
+PaneWish Painter::wish_for(const Camera& camera, const WindowArea& area,
+                           std::optional<double> moving) const {
+    return {camera, shown_displays(), overlay_of(session_->photos, camera, area),
+            photo_beside(session_->photos, session_->display), moving};
 }
 
-void Painter::compose_panes() {
+void Painter::fit_panes() {
     const WindowArea area = free_area(*session_, canvas_.width(), canvas_.height());
     fit_lines(shows_panes_ ? panes_.count() : 0, session_->panes,
               compared_strip(session_->photos, session_->display, area));
-    if (shows_panes_) session_->attempt([&] { panes_.compose(session_->panes); });
 }
 
 BufferPicture Painter::shown() const {
-    if ((picture_.empty() || warm_up_) && live_size_.x > 0)
-        return {&live_pixels_, live_size_.x, live_size_.y};
+    if ((picture_.empty() || warm_up_) && live_.size.x > 0)
+        return {&live_.buffers[live_.at], live_.size.x, live_.size.y};
     return drawn();
 }
 
@@ -271,73 +304,152 @@ BufferPicture Painter::drawn() const {
 }
 
 // All but the whole one are replaced soon.
-void Painter::draw_picture(const PictureKey& key, PictureStep step) {
-    const auto start = Clock::now();
+void Painter::draw_picture(const PictureKey& key, PictureStep step, bool wait) {
     const bool whole = step == PictureStep::whole;
     const MotionQuality quality = whole ? MotionQuality()
                                   : step == PictureStep::preview
                                       ? MotionQuality{1, picture_.most_moving()}
                                       : pacing_.motion().quality();
     const Camera camera = at_scale(key.camera, quality.scale);
+    const bool refines = !pacing_.refined();
     pacing_.drew(step, quality);
     if (step == PictureStep::in_motion) rehearsals_ = 0;  // it measures the same
-    const bool drawn = session_->attempt([&] {
-        render_shown(camera, free_area(*session_, key.camera.width, key.camera.height),
-                     whole ? std::nullopt : std::optional(quality.splats));
-    });
+    const WindowArea area = free_area(*session_, key.camera.width, key.camera.height);
+    const PaneWish wish =
+        wish_for(camera, area, whole ? std::nullopt : std::optional(quality.splats));
+    Started started{.frame = frame_, .step = step, .quality = quality, .made = {}};
     session_->panes.psnr_db.clear();
-    if (!drawn) return pacing_.failed();
+    copies_wanted_ = false;
+    psnr_at_ = 0;
+    if (!make_picture(wish, started, wait)) return pacing_.failed();
+    session_->times.quality = quality;
+    started.refines = refines;
+    started.counts = !panes_.compiled();
+    started.pictures = wish.displays.size();
+    if (wait)
+        note_picture(started, milliseconds_since(started.begun));
+    else
+        under_way_.push_back(std::move(started));
+}
+
+// Whether it could be: else it is said why.
+bool Painter::make_picture(const PaneWish& wish, Started& started, bool wait) {
+    started.begun = Clock::now();
+    shows_panes_ = wish.several();  // also where it fails
+    const bool whole_panes = shows_panes_ && started.step == PictureStep::whole;
+    return session_->attempt([&] {
+        if (!wait) {
+            panes_.start(frame_, picture_, wish);
+            copies_wanted_ = whole_panes;
+            return;
+        }
+        panes_.render(picture_, wish);
+        started.made.status = picture_.status();
+        started.made.passes = panes_.pass_times();
+        if (!whole_panes) return;
+        fit_panes();
+        panes_.compose(session_->panes, true);
+        session_->panes.psnr_db = panes_.psnr_db();
+    });
+}
+
+void Painter::take_results() {
+    for (StartedPicture& made : picture_.take_done()) {
+        const auto of = std::find_if(under_way_.begin(), under_way_.end(),
+                                     [&](const Started& s) { return s.frame == made.frame; });
+        if (of == under_way_.end()) continue;  // of a scene before
+        add_times(made.passes, of->made.passes);
+        of->made.status = made.status;
+        of->made.whole &= made.whole;
+        if (!made.error.empty()) of->made.error = made.error;
+        if (--of->pictures > 0) continue;
+        const Started started = std::move(*of);
+        under_way_.erase(of);
+        take_result(started);
+    }
+}
+
+void Painter::take_result(const Started& started) {
+    const bool rehearsal = started.step == PictureStep::rehearsal;
+    const bool last = std::all_of(under_way_.begin(), under_way_.end(), [](const Started& s) {
+        return s.step == PictureStep::rehearsal;
+    });
+    if (!started.made.error.empty()) {
+        session_->error = started.made.error;
+        if (!rehearsal && last) pacing_.failed();
+        return;
+    }
+    if (!started.made.whole) {  // again, now that there is room
+        if (rehearsal) ++rehearsals_;
+        if (!rehearsal && last) pacing_.miss();
+        return;
+    }
+    const std::vector<PassTime>& passes = started.made.passes;
+    const double ms = passes.empty() ? milliseconds_since(started.begun) : sum_ms(passes);
+    if (!rehearsal) note_picture(started, ms);
+    // Another quality was chosen since: nothing is learnt of it.
+    if (!started.counts || !(started.quality == pacing_.motion().quality())) return;
+    if (rehearsal)
+        pacing_.motion().measured(motion_cost(besides_picture_ms_ + ms, passes));
+    else if (started.step == PictureStep::in_motion && started.frame_ms > 0)
+        pacing_.motion().measured(motion_cost(started.frame_ms, passes));
+}
+
+void Painter::note_picture(const Started& started, double ms) {
     FrameTimes& t = session_->times;
-    t.passes = shows_panes_ ? panes_.pass_times() : picture_.pass_times();
-    t.picture_ms = milliseconds_since(start);
-    if (whole && shows_panes_) session_->panes.psnr_db = panes_.psnr_db();
-    if (whole) t.full_ms = t.picture_ms;
-    t.quality = quality;
-    t.visible = picture_.status().visible;
-    t.intersections = picture_.status().intersections;
-    if (session_->plan && whole)
-        session_->plan->note_frame(picture_.status().huge_splats, picture_.status().longest_list);
+    const bool whole = started.step == PictureStep::whole;
+    t.passes = started.made.passes;
+    t.picture_ms = ms;
+    t.visible = started.made.status.visible;
+    t.intersections = started.made.status.intersections;
+    if (!whole) return;
+    t.full_ms = ms;
+    pacing_.unsettle();
+    if (session_->plan)
+        session_->plan->note_frame(started.made.status.huge_splats,
+                                   started.made.status.longest_list);
+}
+
+void Painter::take_psnr() {
+    if (psnr_at_ == 0 || frame_ < psnr_at_) return;
+    session_->panes.psnr_db = panes_.psnr_db();
+    psnr_at_ = 0;
+    pacing_.unsettle();
 }
 
 // After what a picture needs has changed: pipelines compile at their first use, and the first
 // frames in motion are drawn at a quality that was found before them.
 void Painter::rehearse_motion(const PictureKey& key) {
-    const auto begin = Clock::now();
     const bool first = rehearsals_ == kRehearsals;
     const FrameTimes& t = session_->times;
     if (first) besides_picture_ms_ = std::max(0.0, t.frame_ms - t.picture_ms);
-    session_->attempt([&] {
-        do {
-            const MotionQuality quality = pacing_.motion().quality();
-            // The first makes the copy of the important splats, also where all are wanted now.
-            rehearse_once(key, quality,
-                          rehearsals_ == kRehearsals
-                              ? std::min(quality.splats, picture_.most_moving())
-                              : quality.splats);
-        } while (--rehearsals_ > 0 && !first && milliseconds_since(begin) < kRehearsing_ms);
-    });
-}
-
-void Painter::rehearse_once(const PictureKey& key, const MotionQuality& quality, double splats) {
-    const auto start = Clock::now();
+    const MotionQuality quality = pacing_.motion().quality();
+    // The first makes the copy of the important splats, also where all are wanted now.
+    const double splats = first ? std::min(quality.splats, picture_.most_moving()) : quality.splats;
     const std::vector<DisplaySettings> displays = shown_displays();
-    std::vector<PassTime> passes;
-    bool compiled = false;
-    for (size_t p = 0; p < displays.size(); ++p) {
-        add_times(picture_.rehearse(at_scale(key.camera, quality.scale), displays[p], splats,
-                                    static_cast<int>(p)),
-                  passes);
-        compiled |= picture_.compiled();
-    }
-    if (compiled || splats < quality.splats) return;
-    pacing_.motion().measured(motion_cost(besides_picture_ms_ + milliseconds_since(start), passes));
+    Started started{
+        .frame = frame_, .step = PictureStep::rehearsal, .quality = quality, .made = {}};
+    started.counts = splats == quality.splats;
+    started.pictures = displays.size();
+    started.begun = Clock::now();
+    session_->attempt([&] {
+        for (std::size_t p = 0; p < displays.size(); ++p) {
+            picture_.rehearse(frame_, at_scale(key.camera, quality.scale), displays[p], splats,
+                              static_cast<int>(p));
+            started.counts &= !picture_.compiled();
+        }
+        --rehearsals_;
+        under_way_.push_back(std::move(started));
+    });
 }
 
 void Painter::presented() {
     FrameTimes& t = session_->times;
     t.frame_ms = milliseconds_since(frame_start_);
-    if (!pacing_.in_motion() || (shows_panes_ ? panes_.compiled() : picture_.compiled())) return;
-    pacing_.motion().measured(motion_cost(t.frame_ms, t.passes));
+    if (under_way_.empty() || !pacing_.in_motion()) return;
+    Started& started = under_way_.back();
+    if (started.frame != frame_ || !started.counts) return;
+    started.frame_ms = t.frame_ms;
     t.moving_ms.push_back(t.frame_ms);
     if (t.moving_ms.size() > kTimesKept) t.moving_ms.pop_front();
 }
@@ -346,8 +458,12 @@ std::optional<ImageU8> Painter::picture_alone(int width, int height, bool of_run
     if (!of_run) {
         if (session_->edit.selected_count() > 0) show_marks(false);  // until step_work
         const WindowArea area = free_area(*session_, width, height);
-        render_shown(camera_in_window(session_->photos, session_->navigation, area), area, {});
-        compose_panes();
+        const Camera camera = camera_in_window(session_->photos, session_->navigation, area);
+        const PaneWish wish = wish_for(camera, area, {});
+        shows_panes_ = wish.several();
+        panes_.render(picture_, wish);
+        fit_panes();
+        if (shows_panes_) panes_.compose(session_->panes);
     }
     const BufferPicture taken = of_run ? shown() : drawn();
     if (taken.pixels == nullptr || taken.width == 0) return {};  // of a run that has drawn none

@@ -1,8 +1,13 @@
 // Painter: how it is painted. Pictures of the scene, whole ones and those in motion, the panels
 // over them, and the canvas that takes both; what it needs of the device, and when it draws.
+//
+// Two frames are under way at a time. A frame starts its picture, and what it took, which decides
+// how good the next ones are, is known one or two frames later.
 #pragma once
 
+#include <array>
 #include <chrono>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -37,6 +42,16 @@ struct PaintedFrame {
     bool of_run = false;        // its pictures are shown, not the scene's
 };
 
+/// The last picture of a run. Frames under way may still read those before it.
+struct LivePixels {
+    std::array<Buffer, kFramesUnderWay + 1> buffers;
+    std::size_t at = 0;
+    bool composed = false;  // a frame has taken it
+    glm::ivec2 size{0};     // px
+
+    void set(Device& device, const LiveMade& made);
+};
+
 class Painter {
   public:
     /// window: null without one.
@@ -57,7 +72,8 @@ class Painter {
     void begin_run();
     void show_picture_of_run(const LiveMade& made);
 
-    /// Starts a frame, the panels' as well.
+    /// Starts a frame, the panels' as well: waits for the one before the last, and takes what
+    /// became of the pictures that are done. Throws DeviceLost.
     void begin(int width, int height);
     Gui& gui() { return gui_; }
     /// The picture where something it depends on changed.
@@ -76,7 +92,7 @@ class Painter {
     /// The picture is to be drawn again.
     void forget() { pacing_.forget(); }
     /// It has all pixels, and the most important splats at least.
-    bool refined() const { return pacing_.refined(); }
+    bool refined() const;
     /// It is whole, and one in motion would have nothing to wait for.
     bool at_rest() const;
     /// No levels of merged splats for motion are being made.
@@ -99,6 +115,21 @@ class Painter {
 
   private:
     using Clock = std::chrono::steady_clock;
+    struct Started {  // pictures of a frame, of which it is not known yet what became of them
+        int frame = 0;
+        PictureStep step = PictureStep::none;
+        MotionQuality quality;
+        bool refines = false;      // the picture before it had fewer pixels
+        bool counts = true;        // its time says something: it built nothing
+        std::size_t pictures = 1;  // that are not done
+        StartedPicture made;       // of those that are
+        Clock::time_point begun{};
+        double frame_ms = 0;  // of the frame; 0: it was not shown
+    };
+    void take_results();
+    void take_result(const Started& started);
+    void note_picture(const Started& started, double ms);
+    void take_psnr();
     void lose_scene(const char* why);
     void begin_motion();
     void end_warm_up();
@@ -106,14 +137,15 @@ class Painter {
     void load_current_photo();
     void pace_picture(const PaintedFrame& frame, bool works);
     std::vector<DisplaySettings> shown_displays() const;  // a pane each
-    void render_shown(const Camera& camera, const WindowArea& area, std::optional<double> moving);
-    void compose_panes();
+    PaneWish wish_for(const Camera& camera, const WindowArea& area,
+                      std::optional<double> moving) const;
+    void fit_panes();
     bool ready_to_move() const;
     BufferPicture shown() const;
     BufferPicture drawn() const;  // of the scene, while the run's last picture is still shown too
-    void draw_picture(const PictureKey& key, PictureStep step);
+    void draw_picture(const PictureKey& key, PictureStep step, bool wait);
+    bool make_picture(const PaneWish& wish, Started& started, bool wait);
     void rehearse_motion(const PictureKey& key);
-    void rehearse_once(const PictureKey& key, const MotionQuality& quality, double splats);
     void step_work();
     void start_levels();
     void take_levels();
@@ -127,9 +159,12 @@ class Painter {
     SplatPicture picture_;
     PanePictures panes_;
     bool shows_panes_ = false;  // not picture_
-    Buffer live_pixels_;        // of the run's last picture
-    glm::ivec2 live_size_{0};   // px
+    LivePixels live_;
     PicturePacing pacing_;
+    int frame_ = 0;                  // number of this one
+    std::deque<Started> under_way_;  // by their frames
+    bool copies_wanted_ = false;     // of the panes' pictures, with this frame
+    int psnr_at_ = 0;                // the frame in which they are there; 0: none are made
     int rehearsals_ = 0;             // of motion, still to come
     double besides_picture_ms_ = 0;  // what a frame took beside its picture, before them
     PictureWork work_;

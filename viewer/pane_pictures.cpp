@@ -25,67 +25,84 @@ std::vector<DisplaySettings> pane_displays(const DisplaySettings& display,
     return displays;
 }
 
-bool PanePictures::render_all(SplatPicture& picture, const Camera& camera,
-                              const std::vector<DisplaySettings>& displays,
-                              const PhotoOverlay& photo, bool photo_first,
-                              std::optional<double> moving) {
-    const bool several = photo_first || displays.size() > 1;
-    if (several) {
-        render(picture, camera, displays, photo, photo_first, moving);
-    } else {
-        picture.keep_panes(1);
-        picture.render(camera, displays.front(), photo, moving);
-    }
-    return several;
-}
-
 PanePictures::PanePictures(Device& device) : device_(&device), commands_(device) {}
 
-void PanePictures::render(SplatPicture& picture, const Camera& camera,
-                          const std::vector<DisplaySettings>& displays, const PhotoOverlay& photo,
-                          bool photo_first, std::optional<double> moving) {
-    const std::uint64_t bytes = std::uint64_t(camera.width) * std::uint64_t(camera.height) * 4;
-    const std::size_t photos = photo_first ? 1 : 0;
-    composed_.reset();
-    pass_times_.clear();
-    compiled_ = !strips_;
-    std::vector<Buffer> pictures = std::exchange(pictures_, {});  // none where one has no room
-    pictures.resize(photos + displays.size());
-    for (Buffer& b : pictures)
-        if (b.bytes() < bytes) b = Buffer(*device_, "pane", bytes);
-    if (pixels_.bytes() < bytes) pixels_ = Buffer(*device_, "panes", bytes);
-    pictures_ = std::move(pictures);
-    size_ = {camera.width, camera.height};
-    if (photos > 0) draw_photo(photo, displays.front());
-    picture.keep_panes(displays.size());
-    for (std::size_t i = 0; i < displays.size(); ++i) {
-        picture.render(camera, displays[i], photo, moving, static_cast<int>(i));
-        picture.take_pixels(pictures_[photos + i]);
+void PanePictures::render(SplatPicture& picture, const PaneWish& wish) {
+    prepare(picture, wish);
+    picture.keep_panes(wish.displays.size());
+    for (std::size_t i = 0; i < wish.displays.size(); ++i) {
+        picture.render(wish.camera, wish.displays[i], wish.photo, wish.moving, static_cast<int>(i));
         add_times(picture.pass_times(), pass_times_);
         compiled_ |= picture.compiled();
     }
 }
 
-void PanePictures::draw_photo(const PhotoOverlay& photo, const DisplaySettings& display) {
-    if (!photo_frame_)
-        photo_frame_.emplace(*device_, "photo_frame", SpecConstants{{"THREADS", VIEW_GROUP}});
-    const gpu::DisplayArgs args = display_args(size_.x, size_.y, display, photo);
+void PanePictures::start(int frame, SplatPicture& picture, const PaneWish& wish) {
+    prepare(picture, wish);
+    picture.keep_panes(wish.displays.size());
+    for (std::size_t i = 0; i < wish.displays.size(); ++i) {
+        picture.start(frame, wish.camera, wish.displays[i], wish.photo, wish.moving,
+                      static_cast<int>(i));
+        compiled_ |= picture.compiled();
+    }
+}
+
+// Buffers are made anew only while nothing under way has them.
+void PanePictures::prepare(const SplatPicture& picture, const PaneWish& wish) {
+    composed_.reset();
+    pass_times_.clear();
+    picture_ = &picture;
+    photo_.reset();
+    photo_first_ = wish.photo_first;
+    count_ = 0;  // where one has no room
+    compiled_ = wish.several() && !strips_;
+    if (!wish.several()) return;
+    const SpecConstants threads{{"THREADS", VIEW_GROUP}};
+    if (!strips_) strips_ = Pipeline(*device_, "panes", threads);
+    if (photo_first_ && !photo_frame_) photo_frame_ = Pipeline(*device_, "photo_frame", threads);
+    const std::uint64_t bytes =
+        std::uint64_t(wish.camera.width) * std::uint64_t(wish.camera.height) * 4;
+    const std::size_t count = wish.displays.size() + (photo_first_ ? 1 : 0);
+    std::vector<std::pair<Buffer*, Memory>> needed{{&pixels_, Memory::device}};
+    if (photo_first_) needed.emplace_back(&photo_pixels_, Memory::device);
+    if (copies_.size() < count) copies_.resize(count);
+    if (!wish.moving)
+        for (std::size_t i = 0; i < count; ++i) needed.emplace_back(&copies_[i], Memory::host);
+    for (const auto& [buffer, memory] : needed) {
+        if (buffer->bytes() >= bytes) continue;
+        device_->wait_idle();
+        *buffer = Buffer(*device_, "panes", bytes, memory);
+    }
+    size_ = {wish.camera.width, wish.camera.height};
+    if (photo_first_) {
+        photo_ = wish.photo;
+        photo_display_ = wish.displays.front();
+    }
+    count_ = count;
+}
+
+const Buffer& PanePictures::image(std::size_t n) const {
+    const std::size_t photos = photo_first_ ? 1 : 0;
+    return n < photos ? photo_pixels_ : picture_->pixels(static_cast<int>(n - photos));
+}
+
+void PanePictures::record_photo(Commands& commands) {
+    if (!photo_) return;
+    const gpu::DisplayArgs args = display_args(size_.x, size_.y, photo_display_, *photo_);
     const Groups g = groups_for(std::uint64_t(args.width) * args.height, VIEW_GROUP);
-    commands_.begin();
-    commands_.pass("photo");
-    commands_.dispatch(*photo_frame_, args, {*photo.photo, pictures_.front()}, g.x, g.y);
-    commands_.submit_and_wait();
+    commands.pass("photo");
+    commands.dispatch(photo_frame_, args, {*photo_->photo, photo_pixels_}, g.x, g.y);
+    photo_.reset();
 }
 
 // Where the photo has nothing, the picture beside it is seen, darker.
-void PanePictures::compose(const Panes& panes) {
+void PanePictures::record(Commands& commands, const Panes& panes) {
     const Layout layout{panes.lines, panes.difference, panes.difference_max};
-    if (pictures_.size() < 2 || composed_ == layout) return;
-    if (!strips_) strips_.emplace(*device_, "panes", SpecConstants{{"THREADS", VIEW_GROUP}});
+    if (count_ < 2 || composed_ == layout) return;
+    record_photo(commands);
     const std::vector<int> edges = pane_edges(panes.lines, size_.x);
-    commands_.begin();
-    commands_.pass("panes");
-    for (std::size_t i = 0; i < pictures_.size() && i + 1 < edges.size(); ++i) {
+    commands.pass("panes");
+    for (std::size_t i = 0; i < count_ && i + 1 < edges.size(); ++i) {
         if (edges[i + 1] <= edges[i]) continue;
         const bool difference = panes.difference && i > 0;
         const gpu::PaneArgs args{static_cast<std::uint32_t>(size_.x),
@@ -96,20 +113,30 @@ void PanePictures::compose(const Panes& panes) {
                                  panes.difference_max};
         const Groups g =
             groups_for(std::uint64_t(args.right - args.left) * args.height, VIEW_GROUP);
-        commands_.dispatch(*strips_, args, {pictures_[i], pictures_[i > 0 ? 0 : 1], pixels_}, g.x,
-                           g.y);
+        commands.dispatch(strips_, args, {image(i), image(i > 0 ? 0 : 1), pixels_}, g.x, g.y);
     }
-    commands_.submit_and_wait();
     composed_ = layout;
+}
+
+void PanePictures::compose(const Panes& panes, bool copies) {
+    commands_.begin();
+    record(commands_, panes);
+    if (copies) record_copies(commands_);
+    commands_.submit_and_wait();
+}
+
+void PanePictures::record_copies(Commands& commands) {
+    const std::uint64_t bytes = std::uint64_t(size_.x) * std::uint64_t(size_.y) * 4;
+    for (std::size_t i = 0; i < count_; ++i) commands.copy(image(i), copies_[i], bytes);
 }
 
 std::vector<double> PanePictures::psnr_db() const {
     const std::size_t pixels = std::size_t(size_.x) * std::size_t(size_.y);
+    const auto copy = [&](std::size_t n) {
+        return std::span(static_cast<const std::uint32_t*>(copies_[n].mapped()), pixels);
+    };
     std::vector<double> result;
-    if (pictures_.empty()) return result;
-    const auto first = pictures_.front().download<std::uint32_t>(pixels);
-    for (std::size_t i = 1; i < pictures_.size(); ++i)
-        result.push_back(pixels_psnr_db(pictures_[i].download<std::uint32_t>(pixels), first));
+    for (std::size_t i = 1; i < count_; ++i) result.push_back(pixels_psnr_db(copy(i), copy(0)));
     return result;
 }
 

@@ -1,5 +1,5 @@
-// PanePictures: the pictures of panes on the device, whole ones, and the strips of them that a
-// window shows. Moving a line draws no splats.
+// PanePictures: the pictures of panes, the photo's among them, and the strips of them that a window
+// shows. Moving a line draws no splats.
 #pragma once
 
 #include <map>
@@ -11,47 +11,68 @@
 
 namespace darb {
 
+/// Pictures from one camera, a display each. photo_first: before them the photo, which is there.
+struct PaneWish {
+    Camera camera;
+    std::vector<DisplaySettings> displays;
+    PhotoOverlay photo;
+    bool photo_first = false;
+    std::optional<double> moving;  // as SplatPicture::render
+
+    bool several() const { return photo_first || displays.size() > 1; }
+};
+
 class PanePictures {
   public:
     explicit PanePictures(Device& device);
 
-    /// A picture for each display; photo_first: before them the photo, which is there. Waits.
-    void render(SplatPicture& picture, const Camera& camera,
-                const std::vector<DisplaySettings>& displays, const PhotoOverlay& photo,
-                bool photo_first, std::optional<double> moving);
-    /// The same where there are several pictures; else the one, into `picture`. Whether there are.
-    bool render_all(SplatPicture& picture, const Camera& camera,
-                    const std::vector<DisplaySettings>& displays, const PhotoOverlay& photo,
-                    bool photo_first, std::optional<double> moving);
-    /// The strips, as they are asked for; nothing where they are so already.
-    void compose(const Panes& panes);
+    /// What is wished for, in the panes of `picture`. Waits. Throws Error.
+    void render(SplatPicture& picture, const PaneWish& wish);
+    /// The same as a part of this frame, without waiting. Where there are several pictures,
+    /// `record` belongs to the frame, too.
+    void start(int frame, SplatPicture& picture, const PaneWish& wish);
+    /// The strips of several, as they are asked for; nothing where they are so already.
+    void record(Commands& commands, const Panes& panes);
+    /// The same, and waits. copies: with record_copies.
+    void compose(const Panes& panes, bool copies = false);
+    /// Copies the pictures for psnr_db, which is right once these commands are done.
+    void record_copies(Commands& commands);
     /// Each against the first; see Panes.
     std::vector<double> psnr_db() const;
 
-    std::size_t count() const { return pictures_.size(); }
+    /// Of several, the photo counted.
+    std::size_t count() const { return count_; }
     /// What compose made.
     const Buffer& pixels() const { return pixels_; }
     int width() const { return size_.x; }
     int height() const { return size_.y; }
-    /// Of the last render, summed over the pictures.
+    /// Of what was rendered last, summed over the pictures.
     const std::vector<PassTime>& pass_times() const { return pass_times_; }
+    /// Something was built for the last ones.
     bool compiled() const { return compiled_; }
 
   private:
-    void draw_photo(const PhotoOverlay& photo, const DisplaySettings& display);
     struct Layout {
         std::vector<float> lines;
         bool difference = false;
         float difference_max = 0;
         bool operator==(const Layout&) const = default;
     };
+    void prepare(const SplatPicture& picture, const PaneWish& wish);
+    void record_photo(Commands& commands);
+    const Buffer& image(std::size_t n) const;
 
     Device* device_;
     Commands commands_;
-    std::optional<Pipeline> strips_, photo_frame_;
-    std::vector<Buffer> pictures_;  // B8G8R8A8 [height][width]
-    Buffer pixels_;
-    glm::ivec2 size_{0};  // px
+    Pipeline strips_, photo_frame_;
+    const SplatPicture* picture_ = nullptr;
+    std::size_t count_ = 0;
+    bool photo_first_ = false;
+    std::optional<PhotoOverlay> photo_;  // to be drawn
+    DisplaySettings photo_display_;
+    Buffer photo_pixels_, pixels_;  // B8G8R8A8 [height][width]
+    std::vector<Buffer> copies_;    // of the pictures, for the host
+    glm::ivec2 size_{0};            // px
     std::optional<Layout> composed_;
     std::vector<PassTime> pass_times_;
     bool compiled_ = false;

@@ -55,8 +55,9 @@ void load_photo_of_view(Device& device, Photos& photos) {
     const ImageU8 photo = load_photo(view);
     std::vector<std::uint32_t> texels(photo.data.size() / 4);
     std::memcpy(texels.data(), photo.data.data(), photo.data.size());
-    photos.buffer = Buffer(device, "photo", texels.size() * 4);
-    photos.buffer.upload(texels);
+    Buffer buffer(device, "photo", texels.size() * 4);
+    buffer.upload(texels);  // after what reads the one before
+    photos.buffer = std::move(buffer);
     photos.width = photo.width;
     photos.height = photo.height;
     photos.loaded = photos.current;

@@ -47,12 +47,14 @@ PictureStep PicturePacing::next(const PictureKey& key, const Frame& frame, Time 
 
 void PicturePacing::drew(PictureStep step, const MotionQuality& quality) {
     drawn_ = last_;
+    missed_ = false;
     drawn_as_ = step;
     all_pixels_ = step != PictureStep::in_motion || quality.scale == 1;
 }
 
 void PicturePacing::failed() {
     drawn_ = last_;
+    missed_ = false;
     drawn_as_ = PictureStep::whole;
     all_pixels_ = true;
 }

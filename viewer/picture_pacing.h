@@ -45,6 +45,9 @@ class PicturePacing {
     void drew(PictureStep step, const MotionQuality& quality);
     /// It could not be: not again before something changes.
     void failed();
+    /// The one that was drawn last turned out to be none: another in its place.
+    void miss() { missed_ = true; }
+    bool missed() const { return missed_; }
     /// The picture is one of somebody else, or to be drawn again.
     void forget() { drawn_.reset(); }
     /// Of the last frame. Its time says how good the next may be.
@@ -71,12 +74,13 @@ class PicturePacing {
     const MotionControl& motion() const { return motion_; }
 
   private:
-    bool is_drawn() const { return drawn_ && *drawn_ == last_; }
+    bool is_drawn() const { return drawn_ && !missed_ && *drawn_ == last_; }
     MotionControl motion_;
     PictureKey last_;                  // of the last frame
     std::optional<PictureKey> drawn_;  // of the picture that there is
     PictureStep drawn_as_ = PictureStep::whole;
     bool all_pixels_ = true;  // of that picture
+    bool missed_ = false;
     PictureStep step_ = PictureStep::none;
     int unsettled_ = kSettlingFrames;
     Time changed_at_ = std::chrono::steady_clock::now();

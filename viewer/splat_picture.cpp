@@ -1,11 +1,12 @@
 #include "viewer/splat_picture.h"
 
 #include <algorithm>
-#include <tuple>
+#include <cstring>
 #include <utility>
 
 #include "engine/core/error.h"
 #include "engine/primitives/groups.h"
+#include "engine/raster/frame_view.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_shapes.h"
 
@@ -24,6 +25,7 @@ constexpr float kHighlightShare = 0.65f;
 constexpr float kEllipsoidCutoff = 0.9f;
 constexpr float kEllipsoidGrowth = 1.472f;  // ln(2 / 0.459)
 constexpr float kPointLogScale = -20;       // leaves the low-pass: a dot of about two pixels
+constexpr int kRehearsal = -1;              // in the place of a pane: what nobody sees
 
 // Without harmonics where it is no copy.
 SplatModel in_style(const SplatModel& own, SplatStyle style) {
@@ -51,10 +53,8 @@ SplatModel in_style(const SplatModel& own, SplatStyle style) {
 
 SplatPicture::SplatPicture(Device& device)
     : device_(&device),
-      exchange_(device),
-      commands_(device),
       depth_light_(device, "view_depth", {{"THREADS", VIEW_GROUP}}),
-      no_photo_(device, "no photo", 4) {}
+      nothing_(device, "nothing", 4) {}
 
 void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
                              std::vector<std::uint32_t> important) {
@@ -64,6 +64,7 @@ void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
             "the scene",
             fmt::format("has {} splats, {} can hold {}", model.size(), device_->info().name, most),
             "Choose another device (darb devices), or prune the scene.");
+    settle();
     own_ = GpuSplats(*device_, model, false);
     styled_.reset();
     some_.reset();
@@ -71,9 +72,7 @@ void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
     live_ = nullptr;
     model_ = &model;
     bounds_ = bounds;
-    unseen_.clear();
-    selected_.clear();
-    tinted_ = false;
+    marks_ = {};
     important_ = std::move(important);
 }
 
@@ -84,6 +83,7 @@ void SplatPicture::set_live(const GpuSplats& splats, const Bounds& bounds) {
 }
 
 void SplatPicture::clear() {
+    settle();
     own_.reset();
     styled_.reset();
     some_.reset();
@@ -97,18 +97,18 @@ void SplatPicture::clear() {
 void SplatPicture::set_marks(const std::vector<std::uint8_t>& unseen,
                              const std::vector<std::uint8_t>& selected) {
     if (!own_) return;
-    unseen_ = unseen;
-    selected_ = selected;
+    marks_.unseen = unseen;
+    marks_.selected = selected;
     SplatModel marked;
     marked.opacity_logit = model_->opacity_logit;
     const bool tints = std::find(selected.begin(), selected.end(), 1) != selected.end();
-    if (tints || tinted_) marked.sh_dc = model_->sh_dc;
+    if (tints || marks_.tinted) marked.sh_dc = model_->sh_dc;
     apply_marks({}, marked);
-    if (!marked.opacity_logit.empty()) {
-        own_->parameters(kOpacityLogit).upload(marked.opacity_logit);
-        if (!marked.sh_dc.empty()) own_->parameters(kShDc).upload(marked.sh_dc);
-    }
-    tinted_ = tints;
+    marks_.opacity_logit = std::move(marked.opacity_logit);
+    marks_.sh_dc = std::move(marked.sh_dc);
+    marks_.tinted = tints;
+    if (styled_) drop(std::move(*styled_));
+    if (some_) drop(std::move(*some_));
     styled_.reset();
     some_.reset();
     drop_levels();
@@ -118,8 +118,10 @@ void SplatPicture::apply_marks(const std::vector<std::uint32_t>& splats, SplatMo
     const size_t count = copy.opacity_logit.size();
     for (size_t i = 0; i < count; ++i) {
         const size_t of = splats.empty() ? i : splats[i];
-        if (of < unseen_.size() && unseen_[of] != 0) copy.opacity_logit[i] = kRemovedLogit;
-        if (of >= selected_.size() || selected_[of] == 0 || copy.sh_dc.empty()) continue;
+        if (of < marks_.unseen.size() && marks_.unseen[of] != 0)
+            copy.opacity_logit[i] = kRemovedLogit;
+        if (of >= marks_.selected.size() || marks_.selected[of] == 0 || copy.sh_dc.empty())
+            continue;
         for (size_t c = 0; c < 3; ++c)
             copy.sh_dc[3 * i + c] =
                 glm::mix(copy.sh_dc[3 * i + c], kHighlightDc[c], kHighlightShare);
@@ -128,8 +130,11 @@ void SplatPicture::apply_marks(const std::vector<std::uint32_t>& splats, SplatMo
 
 void SplatPicture::update_scene() {
     if (!own_) return;
+    settle();
     own_ = GpuSplats(*device_, *model_, false);
-    tinted_ = false;
+    marks_.tinted = false;
+    marks_.opacity_logit.clear();
+    marks_.sh_dc.clear();
     styled_.reset();
     some_.reset();
     drop_levels();
@@ -138,13 +143,15 @@ void SplatPicture::update_scene() {
 void SplatPicture::add_level(const SplatModel& level) {
     const auto same = std::find_if(levels_.begin(), levels_.end(),
                                    [&](const GpuSplats& l) { return l.count() == level.size(); });
-    if (same != levels_.end())
-        *same = GpuSplats(*device_, level, false);
+    GpuSplats splats(*device_, level, false);
+    if (same == levels_.end())
+        levels_.push_back(std::move(splats));
     else
-        levels_.emplace_back(*device_, level, false);
+        drop(std::exchange(*same, std::move(splats)));
 }
 
 void SplatPicture::drop_levels() {
+    for (GpuSplats& level : levels_) drop(std::move(level));
     levels_.clear();
     levels_ended_ = false;
 }
@@ -163,6 +170,7 @@ const GpuSplats& SplatPicture::styled(SplatStyle style) {
     if (styled_ && styled_as_ == style) return *styled_;
     SplatModel model = in_style(*model_, style);
     apply_marks({}, model);
+    settle();
     styled_.reset();
     styled_.emplace(*device_, model, false);
     styled_as_ = style;
@@ -177,6 +185,7 @@ const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
         SplatModel model = in_style(pick_splats(*model_, important_), style);
         apply_marks(important_, model);
         compiled_ = true;
+        settle();
         some_.reset();
         some_.emplace(*device_, model, false);
         some_as_ = style;
@@ -236,16 +245,24 @@ SplatPicture::Slot& SplatPicture::slot_for(const GpuSplats& splats, const Displa
     compiled_ |= !same || slot.degree != degree;
     slot.degree = degree;
     if (same) return slot;
+    settle();
     slot.buffers.reset();
     slot.forward.reset();
     slot.buffers.emplace(*device_, options_for(key));
     slot.forward.emplace(*device_, options_for(key));
     slot.key = key;
+    slot.fresh = true;
     return slot;
 }
 
 void SplatPicture::keep_panes(std::size_t count) {
-    slots_.erase(slots_.lower_bound(2 * static_cast<int>(count)), slots_.end());
+    const int end = static_cast<int>(count);
+    const auto slots = slots_.lower_bound(2 * end);
+    const auto images = images_.lower_bound(end);
+    if (slots == slots_.end() && images == images_.end()) return;
+    settle();
+    slots_.erase(slots, slots_.end());
+    images_.erase(images, images_.end());
 }
 
 bool SplatPicture::ready_to_move(const DisplaySettings& display, int pane) const {
@@ -258,79 +275,238 @@ bool SplatPicture::ready_to_move(const DisplaySettings& display, int pane) const
            slot.degree == std::min(display.sh_degree, slot.key.sh_stored);
 }
 
-std::vector<PassTime> SplatPicture::rehearse(const Camera& camera, const DisplaySettings& display,
-                                             double moving, int pane) {
-    Buffer kept = std::exchange(pixels_, Buffer());
-    const auto before = std::tuple(size_.x, size_.y, status_);
-    const auto put_back = [&] {
-        pixels_ = std::move(kept);
-        std::tie(size_.x, size_.y, status_) = before;
-    };
-    try {
-        render(camera, display, {}, moving, pane);
-    } catch (...) {
-        put_back();
-        throw;
-    }
-    put_back();
-    return pass_times_;
+void SplatPicture::render(const Camera& camera, const DisplaySettings& display,
+                          const PhotoOverlay& photo, std::optional<double> moving, int pane) {
+    Job job = prepare(camera, display, photo, moving, pane);
+    prepare_image(job, pane);
+    render(job);
 }
 
-void SplatPicture::render(const Camera& seen, const DisplaySettings& display,
-                          const PhotoOverlay& photo, std::optional<double> moving, int pane) {
+void SplatPicture::start(int frame, const Camera& camera, const DisplaySettings& display,
+                         const PhotoOverlay& photo, std::optional<double> moving, int pane) {
+    Job job = prepare(camera, display, photo, moving, pane);
+    prepare_image(job, pane);
+    give(frame, job);
+}
+
+void SplatPicture::rehearse(int frame, const Camera& camera, const DisplaySettings& display,
+                            double moving, int pane) {
+    Job job = prepare(camera, display, {}, moving, pane);
+    prepare_image(job, kRehearsal);
+    give(frame, job);
+}
+
+SplatPicture::Job SplatPicture::prepare(const Camera& camera, const DisplaySettings& display,
+                                        const PhotoOverlay& photo, std::optional<double> moving,
+                                        int pane) {
     compiled_ = false;
-    const GpuSplats& shown = moving ? some_styled(display.style, *moving) : styled(display.style);
-    Slot& slot = slot_for(shown, display, moving.has_value(), pane);
-    Forward& forward = *slot.forward;
-    FrameBuffers& buffers = *slot.buffers;
-    Frame& frame = buffers.frame();
-    Camera camera = seen;
-    if (!display.effects.lens) camera.lens = {};
+    Job job{camera, {}, display, photo};
+    job.splats = moving ? &some_styled(display.style, *moving) : &styled(display.style);
+    job.slot = &slot_for(*job.splats, display, moving.has_value(), pane);
+    if (!display.effects.lens) job.camera.lens = {};
     const bool is_halved =
         display.accuracy.value(kRenderScale) < 1 && display.mode != VIEW_COUNT && !moving;
-    const Camera rendered = is_halved ? halved(camera) : camera;
+    job.rendered = is_halved ? halved(job.camera) : job.camera;
     compiled_ |= is_halved && !upsample_;
     if (is_halved && !upsample_) upsample_.emplace(*device_);
-    const bool depth = display.mode == VIEW_DEPTH;
-    const FrameView view{camera_data(rendered, shown.origin(), display.near_plane),
-                         &exchange_.cameras(), 0, std::min(display.sh_degree, shown.sh_degree()),
-                         depth ? glm::vec3(0.0f) : display.background};
-    const std::uint64_t bytes = std::uint64_t(camera.width) * camera.height * 4;
-    if (pixels_.bytes() < bytes) pixels_ = Buffer(*device_, "pixels", bytes);
-    const std::uint32_t intersections =
-        std::max(frame.size.intersections,
-                 std::min(shown.count() * 2, FrameBuffers::max_intersections(*device_)));
-    buffers.reserve(shown.count(), intersections, rendered.width, rendered.height);
-    do {
-        commands_.begin();
-        exchange_.send(commands_, view.camera);
-        forward.record_intersections(commands_, shown, view, frame);
-        if (depth) record_depth_colours(frame.splats, camera, shown.count());
-        forward.record_blend(commands_, view, frame);
-        const Buffer& image =
-            is_halved ? upsample_->record(commands_, frame.images.image, rendered, camera)
-                      : frame.images.image;
-        record_display(frame, image, camera, display, photo);
-        exchange_.fetch(commands_, frame.counters.status);
-        commands_.submit_and_wait();
-        status_ = exchange_.status();
-    } while (buffers.make_room(status_));
-    pass_times_ = commands_.pass_times();
-    size_.x = camera.width;
-    size_.y = camera.height;
+    const bool has_photo = photo.photo != nullptr && display.mode == VIEW_ERROR;
+    job.pipeline = &display_pipelines_[display.mode * 2 + (has_photo ? 1 : 0)];
+    compiled_ |= !*job.pipeline;
+    if (!*job.pipeline)
+        *job.pipeline = Pipeline(
+            *device_, "display",
+            {{"THREADS", VIEW_GROUP}, {"MODE", display.mode}, {"HAS_PHOTO", has_photo ? 1 : 0}});
+    reserve(job);
+    return job;
 }
 
-void SplatPicture::record_depth_colours(const ProjectedSplats& projected, const Camera& camera,
-                                        std::uint32_t splats) {
+void SplatPicture::reserve(const Job& job) {
+    const std::uint32_t splats = job.splats->count();
+    const int width = job.rendered.width, height = job.rendered.height;
+    const std::uint64_t pixels = std::uint64_t(width) * std::uint64_t(height),
+                        shown = std::uint64_t(job.camera.width) * std::uint64_t(job.camera.height);
+    FrameBuffers& buffers = *job.slot->buffers;
+    const FrameSize& has = buffers.size();
+    const std::uint32_t intersections = std::max(
+        has.intersections, std::min(splats * 2, FrameBuffers::max_intersections(*device_)));
+    if (splats > has.splats || intersections > has.intersections || pixels > has.pixels ||
+        image_tiles(width, height) > has.tiles || shown > most_pixels_)
+        settle();
+    most_pixels_ = std::max(most_pixels_, shown);
+    buffers.reserve(splats, intersections, width, height);
+}
+
+// The older of the two is written.
+void SplatPicture::prepare_image(Job& job, int index) {
+    Image& image = images_[index];
+    const std::uint64_t bytes =
+        std::uint64_t(job.camera.width) * std::uint64_t(job.camera.height) * 4;
+    if (image.before.bytes() < bytes) {
+        settle();
+        image.before = Buffer(*device_, "pixels", bytes);
+    }
+    std::swap(image.now, image.before);
+    image.size_before = std::exchange(image.size, {job.camera.width, job.camera.height});
+    job.image = &image;
+}
+
+void SplatPicture::render(const Job& job) {
+    if (!under_way_.empty()) settle();  // a flag of theirs would be taken for one of this picture
+    job.slot->fresh = false;
+    rendered_ = {};
+    do {
+        std::unique_ptr<Flight> flight = free_flight();
+        record(job, *flight);
+        flight->commands.submit_and_wait();
+        flight->uploads.clear();
+        rendered_.status = flight->exchange.status();
+        rendered_.passes = flight->commands.pass_times();
+        free_.push_back(std::move(flight));
+    } while (job.slot->buffers->make_room(rendered_.status));
+}
+
+// The first of a slot compiles, and its buffers are a guess: nothing would be seen meanwhile.
+void SplatPicture::give(int frame, const Job& job) {
+    if (job.slot->fresh) {
+        render(job);
+        rendered_.frame = frame;
+        done_.push_back(rendered_);
+        return;
+    }
+    std::unique_ptr<Flight> flight = free_flight();
+    flight->frame = frame;
+    flight->slot = job.slot;
+    record(job, *flight);
+    flight->commands.submit();
+    under_way_.push_back(std::move(flight));
+}
+
+std::unique_ptr<SplatPicture::Flight> SplatPicture::free_flight() {
+    if (free_.empty()) return std::make_unique<Flight>(*device_);
+    std::unique_ptr<Flight> flight = std::move(free_.back());
+    free_.pop_back();
+    flight->in_vain = false;
+    return flight;
+}
+
+void SplatPicture::finish(int frame) {
+    while (!under_way_.empty() && under_way_.front()->frame <= frame) land();
+}
+
+std::vector<StartedPicture> SplatPicture::take_done() {
+    while (!under_way_.empty() && under_way_.front()->commands.done()) land();
+    return std::exchange(done_, {});
+}
+
+// The first of those under way; waits for it.
+void SplatPicture::land() {
+    std::unique_ptr<Flight> flight = std::move(under_way_.front());
+    under_way_.pop_front();
+    flight->commands.wait();
+    StartedPicture made;
+    made.frame = flight->frame;
+    made.status = flight->exchange.status();
+    made.passes = flight->commands.pass_times();
+    try {
+        made.whole = !make_room(*flight, made.status);
+    } catch (const DeviceLost&) {
+        throw;
+    } catch (const Error& e) {
+        made.whole = false;
+        made.error = e.what();
+    }
+    flight->uploads.clear();
+    flight->dropped.clear();
+    done_.push_back(std::move(made));
+    free_.push_back(std::move(flight));
+}
+
+// The flag of a frame without room stays until the host clears it, so those after it in the same
+// buffers have it, too.
+bool SplatPicture::make_room(Flight& flight, const gpu::FrameStatus& status) {
+    if (flight.in_vain) return true;
+    gpu::FrameStatus wanted = status;
+    if (status.overflow != 0) device_->wait_idle();
+    for (const auto& later : under_way_) {
+        if (status.overflow == 0 || later->slot != flight.slot) continue;
+        later->in_vain = true;
+        const gpu::FrameStatus its = later->exchange.status();
+        wanted.overflow |= its.overflow;
+        wanted.intersections = std::max(wanted.intersections, its.intersections);
+        wanted.longest_list = std::max(wanted.longest_list, its.longest_list);
+    }
+    return flight.slot->buffers->make_room(wanted);
+}
+
+void SplatPicture::settle() {
+    device_->wait_idle();
+    while (!under_way_.empty()) land();
+}
+
+// Pictures under way may read them still.
+void SplatPicture::drop(GpuSplats splats) {
+    if (!under_way_.empty()) under_way_.back()->dropped.push_back(std::move(splats));
+}
+
+const SplatPicture::Image& SplatPicture::image_of(int pane) const {
+    static const Image kNone;
+    const auto image = images_.find(pane);
+    return image == images_.end() ? kNone : image->second;
+}
+
+void SplatPicture::record(const Job& job, Flight& flight) {
+    Forward& forward = *job.slot->forward;
+    Frame& frame = job.slot->buffers->frame();
+    const DisplaySettings& display = job.display;
+    const bool depth = display.mode == VIEW_DEPTH;
+    const FrameView view{camera_data(job.rendered, job.splats->origin(), display.near_plane),
+                         &flight.exchange.cameras(), 0,
+                         std::min(display.sh_degree, job.splats->sh_degree()),
+                         depth ? glm::vec3(0.0f) : display.background};
+    Commands& commands = flight.commands;
+    commands.begin();
+    record_uploads(flight);
+    flight.exchange.send(commands, view.camera);
+    forward.record_intersections(commands, *job.splats, view, frame);
+    if (depth) record_depth_colours(job, commands);
+    forward.record_blend(commands, view, frame);
+    const bool is_halved =
+        job.rendered.width != job.camera.width || job.rendered.height != job.camera.height;
+    const Buffer& image =
+        is_halved ? upsample_->record(commands, frame.images.image, job.rendered, job.camera)
+                  : frame.images.image;
+    record_display(job, image, commands);
+    flight.exchange.fetch(commands, frame.counters.status);
+}
+
+// What is marked since the last picture.
+void SplatPicture::record_uploads(Flight& flight) {
+    const auto upload = [&](int attribute, std::vector<float>& values) {
+        if (values.empty() || !own_) return;
+        const std::uint64_t bytes = values.size() * sizeof(float);
+        Buffer host(*device_, "marks", bytes, Memory::waiting);
+        std::memcpy(host.mapped(), values.data(), bytes);
+        flight.commands.copy(host, own_->parameters(attribute), bytes);
+        flight.uploads.push_back(std::move(host));
+        values.clear();
+    };
+    upload(kOpacityLogit, marks_.opacity_logit);
+    upload(kShDc, marks_.sh_dc);
+}
+
+void SplatPicture::record_depth_colours(const Job& job, Commands& commands) {
+    const std::uint32_t splats = job.splats->count();
     if (splats == 0) return;
+    const Camera& camera = job.camera;
     const double depth =
         glm::dot(glm::transpose(camera.rotation)[2], bounds_.centre - camera.centre());
     const gpu::DepthLightArgs args{splats,
                                    static_cast<float>(std::max(0.0, depth - 1.5 * bounds_.radius)),
                                    static_cast<float>(std::max(depth, 0.0) + 1.5 * bounds_.radius)};
-    commands_.pass("depth colours");
+    commands.pass("depth colours");
     const Groups g = groups_for(splats);
-    commands_.dispatch(depth_light_, args, {projected.bound, projected.light}, g.x, g.y);
+    const ProjectedSplats& projected = job.slot->buffers->frame().splats;
+    commands.dispatch(depth_light_, args, {projected.bound, projected.light}, g.x, g.y);
 }
 
 gpu::DisplayArgs display_args(int width, int height, const DisplaySettings& display,
@@ -353,22 +529,23 @@ gpu::DisplayArgs display_args(int width, int height, const DisplaySettings& disp
     return args;
 }
 
-void SplatPicture::record_display(const Frame& frame, const Buffer& image, const Camera& camera,
-                                  const DisplaySettings& display, const PhotoOverlay& photo) {
-    const gpu::DisplayArgs args = display_args(camera.width, camera.height, display, photo);
-    const bool has_photo = photo.photo != nullptr && display.mode == VIEW_ERROR;
-    Pipeline& pipeline = display_pipelines_[display.mode * 2 + (has_photo ? 1 : 0)];
-    compiled_ |= !pipeline;
-    if (!pipeline)
-        pipeline = Pipeline(
-            *device_, "display",
-            {{"THREADS", VIEW_GROUP}, {"MODE", display.mode}, {"HAS_PHOTO", has_photo ? 1 : 0}});
-    commands_.pass("display");
+void SplatPicture::record_display(const Job& job, const Buffer& image, Commands& commands) {
+    const Image& shown = *job.image;
+    const Frame& frame = job.slot->buffers->frame();
+    gpu::DisplayArgs args = display_args(shown.size.x, shown.size.y, job.display, job.photo);
+    const bool has_photo = job.photo.photo != nullptr && job.display.mode == VIEW_ERROR;
+    const bool has_before = shown.size_before.x > 0;
+    if (has_before) {
+        args.before_width = static_cast<std::uint32_t>(shown.size_before.x);
+        args.before_height = static_cast<std::uint32_t>(shown.size_before.y);
+    }
+    commands.pass("display");
     const Groups g = groups_for(std::uint64_t(args.width) * args.height, VIEW_GROUP);
-    commands_.dispatch(pipeline, args,
-                       {image, has_photo ? *photo.photo : no_photo_, frame.intersections.tile_range,
-                        frame.images.last_intersection, pixels_},
-                       g.x, g.y);
+    commands.dispatch(*job.pipeline, args,
+                      {image, has_photo ? *job.photo.photo : nothing_,
+                       frame.intersections.tile_range, frame.images.last_intersection,
+                       frame.counters.status, has_before ? shown.before : nothing_, shown.now},
+                      g.x, g.y);
 }
 
 }  // namespace darb

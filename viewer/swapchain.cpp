@@ -28,14 +28,14 @@ Swapchain::Swapchain(Device& device, VkSurfaceKHR surface) : device_(&device), s
                     "Choose another device (darb devices), or use --screenshot or darb render.");
     }
     choose_format();
-    acquired_ = make_semaphore(device.handle());
+    for (VkSemaphore& one : acquired_) one = make_semaphore(device.handle());
 }
 
 Swapchain::~Swapchain() {
-    device_->wait_idle();
+    finish_quietly(*device_);
     release_images();
     vkDestroySwapchainKHR(device_->handle(), chain_, nullptr);
-    vkDestroySemaphore(device_->handle(), acquired_, nullptr);
+    for (const VkSemaphore one : acquired_) vkDestroySemaphore(device_->handle(), one, nullptr);
     vkDestroySurfaceKHR(device_->instance(), surface_, nullptr);
 }
 
@@ -117,8 +117,10 @@ bool Swapchain::acquire(int width, int height, std::uint32_t& index) {
                          extent_.height != static_cast<std::uint32_t>(height);
     if (stale_ || resized) create(width, height);
     if (stale_) return false;
-    const VkResult result = vkAcquireNextImageKHR(device_->handle(), chain_, UINT64_MAX, acquired_,
-                                                  VK_NULL_HANDLE, &index);
+    const std::size_t next = (turn_ + 1) % acquired_.size();
+    const VkResult result = vkAcquireNextImageKHR(device_->handle(), chain_, UINT64_MAX,
+                                                  acquired_[next], VK_NULL_HANDLE, &index);
+    if (result == VK_SUCCESS || result == VK_SUBOPTIMAL_KHR) turn_ = next;
     if (result == VK_SUBOPTIMAL_KHR) return true;  // shown once more, then the size is looked at
     if (result == VK_ERROR_OUT_OF_DATE_KHR) {
         stale_ = true;
@@ -133,8 +135,7 @@ bool Swapchain::finish(Canvas& canvas, std::uint32_t index) {
     Commands& commands = canvas.commands();
     commands.copy(canvas.image(), target, VK_FILTER_NEAREST);
     commands.change_layout(target, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR);
-    commands.submit(acquired_, drawn_[index]);
-    commands.wait();
+    commands.submit(acquired_[turn_], drawn_[index]);
     VkPresentInfoKHR info{};
     info.sType = VK_STRUCTURE_TYPE_PRESENT_INFO_KHR;
     info.waitSemaphoreCount = 1;

@@ -3,6 +3,7 @@
 
 #include <vulkan/vulkan.h>
 
+#include <array>
 #include <vector>
 
 #include "engine/gpu/device.h"
@@ -18,9 +19,10 @@ class Swapchain {
     Swapchain(const Swapchain&) = delete;
     Swapchain& operator=(const Swapchain&) = delete;
 
-    /// Copies the composed canvas into the next image and presents it. compose records the canvas
-    /// and is called once there is an image. False where nothing is shown, as the window changed
-    /// its size meanwhile or has none: the next call makes a new chain.
+    /// Copies the composed canvas into the next image and presents it, without waiting for the
+    /// device. compose records the canvas and is called once there is an image. False where nothing
+    /// is shown, as the window changed its size meanwhile or has none: the next call makes a new
+    /// chain.
     template <class Compose>
     bool present(Canvas& canvas, const Compose& compose) {
         std::uint32_t index = 0;
@@ -42,8 +44,9 @@ class Swapchain {
     VkPresentModeKHR mode_ = VK_PRESENT_MODE_FIFO_KHR;
     VkSwapchainKHR chain_ = VK_NULL_HANDLE;
     std::vector<DeviceImage> images_;
-    std::vector<VkSemaphore> drawn_;  // one an image
-    VkSemaphore acquired_ = VK_NULL_HANDLE;
+    std::vector<VkSemaphore> drawn_;                       // one an image
+    std::array<VkSemaphore, kFramesUnderWay> acquired_{};  // one a frame under way
+    std::size_t turn_ = 0;
     VkExtent2D extent_{};
     bool stale_ = true;
 };

@@ -433,6 +433,11 @@ void Commands::wait() {
     check_vulkan(result, s.all_passes());
 }
 
+bool Commands::done() const {
+    const State& s = *state_;
+    return !s.in_flight || vkGetFenceStatus(s.device.handle(), s.fence) != VK_NOT_READY;
+}
+
 const std::vector<RecordedPass>& Commands::recorded() const {
     return state_->passes;
 }

@@ -100,6 +100,8 @@ class Commands {
     void submit(VkSemaphore wait_for = VK_NULL_HANDLE, VkSemaphore signal = VK_NULL_HANDLE);
     /// Blocks (no spinning) until the last submit is done. Throws DeviceLost.
     void wait();
+    /// Whether wait() would return at once; also where the device is lost, which wait() says.
+    bool done() const;
     void submit_and_wait() {
         submit();
         wait();

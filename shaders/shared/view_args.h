@@ -25,6 +25,7 @@ struct DisplayArgs {
     float photo_scale;               // px of the frame per photo px
     uint photo_width, photo_height;  // px
     float background_r, background_g, background_b;
+    uint before_width, before_height;  // px of the picture before; 0: there is none
 };
 
 // view_depth: replaces each visible splat's colour by (depth between near and far, 1, 0).
@@ -43,7 +44,7 @@ struct PaneArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(DisplayArgs) == 48);
+static_assert(sizeof(DisplayArgs) == 56);
 static_assert(sizeof(PaneArgs) == 24);
 static_assert(sizeof(DepthLightArgs) == 12);
 }  // namespace darb::gpu

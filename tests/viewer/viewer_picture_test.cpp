@@ -259,9 +259,11 @@ TEST_F(ViewerTest, Picture_is_coarse_in_motion_and_refined_at_rest) {
     for (int i = 0; i < 1'000'000 && !(s.times.quality == MotionQuality()); ++i)
         next = viewer_->frame({}, kWidth, kHeight, false);
     EXPECT_EQ(s.times.quality, MotionQuality());
-    EXPECT_EQ(next, 0);  // the panels show the times of the refined picture
-    viewer_->frame({}, kWidth, kHeight, false);
-    next = viewer_->frame({}, kWidth, kHeight, false);
+    EXPECT_EQ(next, 0);  // the panels show the times of the refined picture, once it is done
+    for (int i = 0; i < 6 && next == 0; ++i) {
+        shot(false);
+        next = viewer_->frame({}, kWidth, kHeight, false);
+    }
     EXPECT_EQ(next, std::numeric_limits<double>::infinity());  // then nothing is drawn any more
     EXPECT_TRUE(viewer_->at_rest());
     s.navigation.orbit(-0.3, 0);
@@ -277,13 +279,13 @@ TEST_F(ViewerTest, A_picture_that_takes_long_is_refined_in_two_steps) {
     s.navigation.orbit(0.3, 0);
     shot(false);
     EXPECT_FALSE(viewer_->refined());
-    for (int i = 0; i < 1'000'000 && !viewer_->refined(); ++i)
+    bool previewed = false;
+    for (int i = 0; i < 1'000'000 && !viewer_->at_rest(); ++i) {
         viewer_->frame({}, kWidth, kHeight, false);
-    EXPECT_FALSE(viewer_->at_rest());
-    EXPECT_EQ(s.times.quality.scale, 1);
-    EXPECT_LT(s.times.quality.splats, 1);
-    viewer_->frame({}, kWidth, kHeight, false);
-    EXPECT_TRUE(viewer_->at_rest());
+        previewed |= s.times.quality.scale == 1 && s.times.quality.splats < 1;
+    }
+    EXPECT_TRUE(previewed);
+    EXPECT_TRUE(viewer_->refined());
     EXPECT_EQ(s.times.quality, MotionQuality());
 }
 

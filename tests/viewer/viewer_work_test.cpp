@@ -83,6 +83,160 @@ void ViewerWork::drag(const glm::dvec2& from, const glm::dvec2& to, bool let_go)
     if (let_go) frame(input);
 }
 
+class FramesUnderWay : public ViewerWork {
+  protected:
+    // A camera that looks along z, this far from the middle.
+    static Camera from(double distance) {
+        Camera c;
+        c.width = kWidth;
+        c.height = kHeight;
+        c.fx = c.fy = kWidth;
+        c.cx = kWidth / 2.0;
+        c.cy = kHeight / 2.0;
+        c.translation.z = distance;
+        return c;
+    }
+    // Each as large as what `from(3)` sees: of 24 tiles.
+    static SplatModel large_splats(std::size_t count) {
+        SplatModel m;
+        m.resize(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            m.position[3 * i + 2] = 0.1f * static_cast<float>(i) / static_cast<float>(count);
+            m.sh_dc[3 * i] = static_cast<float>(i % 3) - 1;
+            m.rotation[4 * i] = 1;
+            for (std::size_t c = 0; c < 3; ++c) m.log_scale[3 * i + c] = 0.5f;
+        }
+        return m;
+    }
+    static std::vector<std::uint32_t> pixels(const SplatPicture& picture) {
+        return picture.pixels().download<std::uint32_t>(kWidth * kHeight);
+    }
+    // Pictures in motion while the camera turns, the window has another size for some and a splat
+    // is selected in one. wait: for each before the next begins.
+    std::vector<std::vector<std::uint32_t>> turn(bool wait);
+};
+
+std::vector<std::vector<std::uint32_t>> FramesUnderWay::turn(bool wait) {
+    make_viewer(options_);
+    load(file_);
+    session().panels = true;
+    for (int i = 0; i < 3; ++i) shot(false);
+    constexpr int kFrames = 16, kWide = 200;
+    std::vector<Buffer> copies;
+    for (int i = 0; i < kFrames; ++i) {
+        const bool wide = i % 8 >= 4;
+        const int width = wide ? kWide : kWidth;
+        copies.emplace_back(shared_device(), "copy", width * kHeight * 4, Memory::host);
+        session().navigation.orbit(0.1, 0.02);
+        if (i == 6) {
+            Input all;
+            all.pressed = {Key::select_all};
+            viewer_->frame(all, width, kHeight, false);
+        } else {
+            viewer_->frame({}, width, kHeight, false);
+        }
+        viewer_->compose();
+        Commands& commands = viewer_->canvas().commands();
+        commands.copy(viewer_->canvas().image(), copies.back());
+        if (wait)
+            commands.submit_and_wait();
+        else
+            commands.submit();
+    }
+    viewer_.reset();  // the last two may be under way
+    std::vector<std::vector<std::uint32_t>> shown;
+    for (const Buffer& copy : copies)
+        shown.push_back(copy.download<std::uint32_t>(copy.bytes() / 4));
+    return shown;
+}
+
+// Two frames share pictures, canvas and panels' memory: none may see the next one's.
+TEST_F(FramesUnderWay, Show_what_they_show_one_at_a_time) {
+    const auto one_by_one = turn(true), at_once = turn(false);
+    ASSERT_EQ(one_by_one.size(), at_once.size());
+    for (std::size_t i = 0; i < at_once.size(); ++i) {
+        EXPECT_EQ(at_once[i], one_by_one[i]) << "frame " << i;
+        if (i > 0) {
+            EXPECT_NE(at_once[i], at_once[i - 1]) << "frame " << i;
+        }
+    }
+}
+
+TEST_F(FramesUnderWay, Are_followed_by_their_results_in_order) {
+    const SplatModel model = large_splats(20);
+    SplatPicture picture(shared_device());
+    picture.set_scene(model, {{0, 0, 0}, 2});
+    const DisplaySettings display;
+    picture.render(from(60), display, {});
+    const gpu::FrameStatus far = picture.status();
+    picture.render(from(3), display, {});
+    const gpu::FrameStatus near = picture.status();
+    const auto shown = pixels(picture);
+    ASSERT_GT(near.intersections, far.intersections);
+    picture.start(1, from(60), display, {});
+    picture.start(2, from(3), display, {});
+    picture.finish(1);
+    picture.finish(2);
+    const std::vector<StartedPicture> done = picture.take_done();
+    ASSERT_EQ(done.size(), 2u);
+    for (const int i : {0, 1}) {
+        EXPECT_EQ(done[i].frame, i + 1);
+        EXPECT_TRUE(done[i].whole);
+        EXPECT_EQ(done[i].status.intersections, (i == 0 ? far : near).intersections);
+        EXPECT_EQ(done[i].passes.size(), picture.pass_times().size());
+    }
+    EXPECT_EQ(pixels(picture), shown);
+    EXPECT_TRUE(picture.take_done().empty());
+}
+
+// From afar there are few intersections of splats and tiles; near by more than were made room for.
+TEST_F(FramesUnderWay, Leave_the_picture_before_where_there_is_no_room) {
+    const SplatModel model = large_splats(100);
+    SplatPicture picture(shared_device());
+    picture.set_scene(model, {{0, 0, 0}, 2});
+    const DisplaySettings display;
+    picture.render(from(60), display, {});
+    const auto far = pixels(picture);
+    picture.start(1, from(3), display, {});
+    picture.start(2, from(3), display, {});
+    picture.finish(2);
+    std::vector<StartedPicture> done = picture.take_done();
+    ASSERT_EQ(done.size(), 2u);
+    ASSERT_FALSE(done[0].whole) << done[0].status.intersections << " intersections";
+    EXPECT_FALSE(done[1].whole);
+    EXPECT_EQ(pixels(picture), far);
+    picture.start(3, from(3), display, {});
+    picture.finish(3);
+    done = picture.take_done();
+    ASSERT_EQ(done.size(), 1u);
+    EXPECT_TRUE(done[0].whole);
+    const auto near = pixels(picture);
+    EXPECT_NE(near, far);
+    picture.render(from(3), display, {});
+    EXPECT_EQ(near, pixels(picture));
+}
+
+// What a window does where a picture in motion had no room: it draws another, and says nothing.
+TEST_F(FramesUnderWay, Are_made_up_for_in_the_window) {
+    write_ply(file_, large_splats(1000));
+    load(file_);
+    shot();
+    Navigation& n = session().navigation;
+    n.look_from({0, 0, 0}, 3);
+    const ImageU8 near = shot();
+    n.look_from({0, 0, 0}, 60);
+    const ImageU8 far = shot(false);
+    n.look_from({0, 0, 0}, 3);
+    EXPECT_EQ(largest_difference(shot(false), far), 0) << "there is room for so much";
+    const ImageU8 again = shot(false);
+    EXPECT_GT(largest_difference(again, far), 50);
+    EXPECT_EQ(session().times.quality.scale, 0.5) << "it is in motion still";
+    ImageU8 shown = again;
+    for (int i = 0; i < 1000 && !viewer_->refined(); ++i) shown = shot(false);
+    EXPECT_EQ(largest_difference(shown, near), 0);
+    EXPECT_TRUE(session().error.empty()) << session().error;
+}
+
 TEST_F(ViewerWork, Tools_select_and_move_and_esc_takes_a_drag_back) {
     load(file_);
     Session& s = session();

@@ -51,6 +51,21 @@ TEST_F(PicturePacingTest, Motion_is_coarse_and_rest_is_whole) {
     EXPECT_TRUE(pacing_.refined() && pacing_.is_whole());
 }
 
+// It is known only after some frames that a picture had no room.
+TEST_F(PicturePacingTest, What_was_missed_is_drawn_again_as_it_would_be) {
+    frame(0);
+    move();
+    frame(1);
+    pacing_.miss();
+    EXPECT_EQ(frame(1.05), PictureStep::in_motion) << "not whole, as it moves";
+    EXPECT_EQ(frame(1.06), PictureStep::none);
+    EXPECT_EQ(frame(1.2), PictureStep::whole);
+    pacing_.miss();
+    EXPECT_FALSE(pacing_.refined() || pacing_.is_whole());
+    EXPECT_EQ(frame(1.3), PictureStep::whole);
+    EXPECT_TRUE(pacing_.is_whole());
+}
+
 TEST_F(PicturePacingTest, A_long_picture_comes_in_two_steps) {
     PicturePacing::Frame slow;
     slow.preview_pays = true;
