@@ -11,10 +11,8 @@
 #include <vector>
 
 #include "viewer/live_picture.h"
-#include "viewer/recent_files.h"
-#include "viewer/remembered_up.h"
 #include "viewer/saved_files.h"
-#include "viewer/scene_loader.h"
+#include "viewer/scene.h"
 #include "viewer/session.h"
 
 namespace darb {

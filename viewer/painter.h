@@ -17,13 +17,11 @@
 #include "viewer/canvas.h"
 #include "viewer/gui.h"
 #include "viewer/live_picture.h"
-#include "viewer/motion_levels.h"
 #include "viewer/pane_pictures.h"
 #include "viewer/picture_pacing.h"
 #include "viewer/picture_work.h"
 #include "viewer/session.h"
 #include "viewer/splat_picture.h"
-#include "viewer/warm_up.h"
 
 namespace darb {
 

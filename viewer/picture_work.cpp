@@ -1,10 +1,58 @@
 #include "viewer/picture_work.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "engine/data/metrics.h"
+#include "engine/scene/edit_splats.h"
+#include "viewer/splat_picture.h"
+#include "viewer/switches.h"
 
 namespace darb {
+
+AccuracyMeasure::AccuracyMeasure(const Camera& camera, const DisplaySettings& display,
+                                 const DisplaySettings& own)
+    : camera_(camera) {
+    DisplaySettings now = display;
+    now.mode = VIEW_COLOUR;
+    now.style = SplatStyle::splats;
+    DisplaySettings exact = now;
+    choose(kPresetRow, kExact, exact);
+    exact.footprint = own.footprint;
+    exact.sh_degree = own.sh_degree;
+    exact.effects = own.effects;
+    exact.huge_splat_path = own.huge_splat_path;
+    pictures_ = {{exact, {}}, {now, {}}};
+    const auto add = [&](int row) {
+        const int count = static_cast<int>(row_choices(row, own.sh_degree).size());
+        for (int choice = 0; choice < count; ++choice) {
+            DisplaySettings changed = now;
+            choose(row, choice, changed);
+            if (!(changed == now)) pictures_.push_back({changed, {}});
+            Picture& picture = changed == now ? pictures_[1] : pictures_.back();
+            picture.choices.push_back({row, choice, 0, 0});
+        }
+    };
+    for (const int row : kAccuracyRows) add(row);
+    for (const int row : kEffectRows) add(row);
+}
+
+void AccuracyMeasure::step(
+    const std::function<Frame(const Camera&, const DisplaySettings&)>& render) {
+    if (done()) return;
+    const Picture& picture = pictures_[next_];
+    const Frame frame = render(camera_, picture.display);
+    if (next_ == 0) exact_ = to_float(frame.picture);
+    const double psnr_db = psnr(to_float(frame.picture), exact_);
+    for (MeasuredChoice choice : picture.choices) {
+        choice.ms = frame.ms;
+        choice.psnr_db = psnr_db;
+        results_.push_back(choice);
+    }
+    ++next_;
+}
 
 namespace {
 
@@ -94,6 +142,52 @@ std::vector<MeasuredChoice> PictureWork::step_measure(SplatPicture& picture) {
     std::vector<MeasuredChoice> results = measure_->results();
     if (measure_->done()) measure_.reset();
     return results;
+}
+
+namespace {
+
+constexpr std::size_t kFew = 256;
+
+SplatModel few_of(const SplatModel& model) {
+    std::vector<std::uint32_t> splats;
+    for (std::size_t i = 0; i < std::min(kFew, model.size()); ++i)
+        splats.push_back(static_cast<std::uint32_t>(i * model.size() / kFew % model.size()));
+    return pick_splats(model, splats);
+}
+
+}  // namespace
+
+WarmUp::WarmUp(Device& window, DeviceOptions options, const SplatModel& model,
+               std::vector<DisplaySettings> displays, const Camera& camera,
+               std::function<void()> wake)
+    : thread_([this, &window, options = std::move(options), few = few_of(model),
+               displays = std::move(displays), camera,
+               wake = std::move(wake)](const std::stop_token& stop) {
+          run(stop, window, options, few, displays, camera);
+          done_ = true;
+          if (wake) wake();
+      }) {}
+
+void WarmUp::run(const std::stop_token& stop, Device& window, const DeviceOptions& options,
+                 const SplatModel& few, const std::vector<DisplaySettings>& displays,
+                 const Camera& camera) {
+    try {
+        Device device(options);
+        device.set_tuning(window.tuning());
+        SplatPicture picture(device);
+        std::vector<std::uint32_t> important(few.size() / 2);
+        std::iota(important.begin(), important.end(), 0u);
+        picture.set_scene(few, scene_bounds(few), std::move(important));
+        for (std::size_t i = 0; i < displays.size(); ++i)
+            for (const bool moves : {false, true})
+                if (!stop.stop_requested())
+                    picture.render(camera, displays[i], {},
+                                   moves ? std::optional(picture.most_moving()) : std::nullopt,
+                                   static_cast<int>(i));
+        for (const PipelineKey& key : live_pipelines(device))
+            if (!stop.stop_requested()) made_.emplace_back(window, key);
+    } catch (const std::exception&) {  // the window says what is wrong, where it is
+    }
 }
 
 }  // namespace darb

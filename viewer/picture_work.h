@@ -2,15 +2,56 @@
 // camera path, and the measurement of settings and effects. Each may run beside the other.
 #pragma once
 
+#include <atomic>
+#include <functional>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
-#include "viewer/accuracy_measure.h"
+#include "engine/core/image.h"
+#include "engine/gpu/device.h"
+#include "engine/gpu/pipeline.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/splat_model.h"
+#include "viewer/display.h"
 #include "viewer/path_export.h"
+#include "viewer/session.h"
 #include "viewer/splat_picture.h"
 
 namespace darb {
+
+class AccuracyMeasure {
+  public:
+    struct Frame {
+        ImageU8 picture;
+        double ms = 0;
+    };
+    /// camera: of all pictures, whose size is therefore the same. display: as it is now; each
+    /// choice is put in its place alone. own: as the scene is meant to be shown; with the exact
+    /// preset, what the error is against.
+    AccuracyMeasure(const Camera& camera, const DisplaySettings& display,
+                    const DisplaySettings& own);
+
+    bool done() const { return next_ >= pictures_.size(); }
+    double share() const { return double(next_) / double(pictures_.size()); }
+    void step(const std::function<Frame(const Camera&, const DisplaySettings&)>& render);
+    const std::vector<MeasuredChoice>& results() const { return results_; }
+
+  private:
+    /// Choices that give the same picture, as all that are chosen now do.
+    struct Picture {
+        DisplaySettings display;
+        std::vector<MeasuredChoice> choices;
+    };
+    Camera camera_;
+    std::vector<Picture> pictures_;  // the exact one first, then as it is now
+    std::vector<MeasuredChoice> results_;
+    size_t next_ = 0;
+    ImageF exact_;
+};
 
 class PictureWork {
   public:
@@ -46,5 +87,31 @@ class PictureWork {
 ImageU8 read_pixels(const Buffer& pixels, int width, int height);
 /// RGB of the last rendered picture.
 ImageU8 read_pixels(const SplatPicture& picture);
+
+// WarmUp: compiles what the pictures of a scene need before a window draws the first, on a thread
+// of its own. It draws on a device of its own first: drivers that compile at the first dispatch
+// keep that on disk, Mesa's among them. Then it makes the same pipelines for the window's device,
+// which finds them there.
+
+class WarmUp {
+  public:
+    /// window: the window's device, which outlives this. options: of one like it. displays: a pane
+    /// each. A few splats of the model are drawn, at rest and in motion. wake: called from the
+    /// thread at the end. Its destructor waits for the picture or pipeline under way.
+    WarmUp(Device& window, DeviceOptions options, const SplatModel& model,
+           std::vector<DisplaySettings> displays, const Camera& camera, std::function<void()> wake);
+    /// Whether it is over; also where it failed, as the window then compiles itself.
+    bool done() const { return done_; }
+    /// Once it is done, for the window's device: to be kept until its pictures are drawn.
+    std::vector<Pipeline> take_pipelines() { return std::move(made_); }
+
+  private:
+    void run(const std::stop_token& stop, Device& window, const DeviceOptions& options,
+             const SplatModel& few, const std::vector<DisplaySettings>& displays,
+             const Camera& camera);
+    std::vector<Pipeline> made_;
+    std::atomic<bool> done_{false};
+    std::jthread thread_;  // the last member
+};
 
 }  // namespace darb

@@ -1,16 +1,17 @@
 #include "viewer/scene.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <fstream>
+#include <numeric>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/point_cloud_ply.h"
 #include "engine/scene/splat_file.h"
-#include "viewer/importance.h"
 
 namespace darb {
 
@@ -144,6 +145,79 @@ std::optional<Scene> LoadJob::take() {
     if (cancelled_) return {};
     if (error_) std::rethrow_exception(error_);
     return std::move(scene_);
+}
+
+SceneLoader::SceneLoader(Resolve resolve, std::function<void()> wake)
+    : resolve_(std::move(resolve)), wake_(std::move(wake)) {}
+
+void SceneLoader::start(const std::filesystem::path& path, bool dropped, bool merges,
+                        const StoredUnits& units) {
+    const std::filesystem::path file = resolve_ ? resolve_(path) : path;
+    cancel();
+    asked_for_ = path;
+    dropped_ = dropped;
+    merges_ = merges;
+    job_ = std::make_unique<LoadJob>(file, wake_, units);
+}
+
+// Its thread ends at its next report of progress; nobody waits for that.
+void SceneLoader::cancel() {
+    if (!job_) return;
+    job_->cancel();
+    cancelled_.push_back(std::move(job_));
+}
+
+std::string SceneLoader::stage() const {
+    return job_ ? fmt::format("{}: {}", job_->file().filename().string(), job_->stage()) : "";
+}
+
+std::optional<LoadedScene> SceneLoader::poll() {
+    std::erase_if(cancelled_, [](const auto& job) { return job->done(); });
+    if (!job_ || !job_->done()) return {};
+    return wait();
+}
+
+std::optional<LoadedScene> SceneLoader::wait() {
+    if (!job_) return {};
+    std::optional<Scene> scene = std::exchange(job_, nullptr)->take();
+    if (!scene) return {};
+    return LoadedScene{std::move(*scene), asked_for_, dropped_, merges_};
+}
+
+namespace {
+
+std::vector<float> importance(const SplatModel& m, const Bounds& bounds) {
+    std::vector<float> value(m.size());
+    const glm::dvec3 middle = bounds.centre - m.origin;
+    for (std::size_t i = 0; i < m.size(); ++i) {
+        const float* s = &m.log_scale[3 * i];
+        const double log_area = double{s[0]} + s[1] + s[2] - std::min({s[0], s[1], s[2]});
+        const glm::dvec3 p(m.position[3 * i], m.position[3 * i + 1], m.position[3 * i + 2]);
+        const double distance = std::max(glm::distance(p, middle) / bounds.radius, 1.0);
+        // Logarithms: a huge splat is no infinity. ln sigmoid, for any logit.
+        const double x = m.opacity_logit[i];
+        const double log_opacity = x < 0 ? x - std::log1p(std::exp(x)) : -std::log1p(std::exp(-x));
+        value[i] = static_cast<float>(log_opacity + log_area - 2 * std::log(distance));
+    }
+    return value;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> most_important(const SplatModel& model, const Bounds& bounds,
+                                          std::size_t count) {
+    const std::vector<float> value = importance(model, bounds);
+    std::vector<std::uint32_t> order(model.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const auto first = [&](std::uint32_t a, std::uint32_t b) {
+        return value[a] != value[b] ? value[a] > value[b] : a < b;
+    };
+    const auto end = order.begin() + static_cast<std::ptrdiff_t>(std::min(count, order.size()));
+    if (end != order.end()) std::nth_element(order.begin(), end, order.end(), first);
+    std::sort(order.begin(), end, first);
+    order.erase(end, order.end());
+    order.shrink_to_fit();
+    return order;
 }
 
 }  // namespace darb

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -74,5 +76,54 @@ class LoadJob {
     std::exception_ptr error_;
     std::thread thread_;
 };
+
+// SceneLoader: the one scene that is being loaded in the background, and the loads before it that
+// were cancelled and still run.
+
+struct LoadedScene {
+    Scene scene;
+    std::filesystem::path asked_for;  // before it was resolved to a file
+    bool dropped = false;             // on the window, rather than named
+    bool merges = false;              // into the scene that is there
+};
+
+class SceneLoader {
+  public:
+    using Resolve = std::function<std::filesystem::path(const std::filesystem::path&)>;
+    /// resolve: the file that a path means, may be none. wake: called from other threads when there
+    /// is something new.
+    SceneLoader(Resolve resolve, std::function<void()> wake);
+
+    /// An earlier load is cancelled. Throws Error where the path means no scene.
+    void start(const std::filesystem::path& path, bool dropped, bool merges = false,
+               const StoredUnits& units = {});
+    void cancel();
+    bool loading() const { return job_ != nullptr; }
+    double share() const { return job_ ? job_->share() : -1; }  // below 0: nothing is loaded
+    std::string stage() const;
+    /// The scene, once it is there. Throws Error where it could not be loaded.
+    std::optional<LoadedScene> poll();
+    /// The same after waiting for it.
+    std::optional<LoadedScene> wait();
+
+  private:
+    Resolve resolve_;
+    std::function<void()> wake_;
+    std::unique_ptr<LoadJob> job_;
+    std::filesystem::path asked_for_;
+    bool dropped_ = false, merges_ = false;
+    std::vector<std::unique_ptr<LoadJob>> cancelled_;
+};
+
+// Which splats of a scene matter most to its pictures: what is drawn while the camera moves.
+
+/// The most splats that are kept in this order; more are too slow for motion where all are.
+inline constexpr std::size_t kMostMoving = 400'000;
+
+/// Indices of the `count` splats with the largest opacity times area of their two longer axes, most
+/// important first; the area is divided by the squared distance to the scene's middle where that is
+/// beyond its radius, so that a far background does not take all. count: at most model.size().
+std::vector<std::uint32_t> most_important(const SplatModel& model, const Bounds& bounds,
+                                          std::size_t count);
 
 }  // namespace darb

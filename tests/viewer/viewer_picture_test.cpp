@@ -9,7 +9,7 @@
 #include "engine/data/metrics.h"
 #include "tests/support/test_lenses.h"
 #include "tests/support/viewer_fixture.h"
-#include "viewer/importance.h"
+#include "viewer/scene.h"
 #include "viewer/switches.h"
 
 namespace darb::test {

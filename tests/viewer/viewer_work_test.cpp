@@ -12,7 +12,7 @@
 #include "engine/data/camera_list.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/viewer_fixture.h"
-#include "viewer/recovery.h"
+#include "viewer/saved_files.h"
 #include "viewer/view_camera.h"
 
 namespace darb::test {

@@ -18,8 +18,8 @@
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/view.h"
 #include "trainer/job/scene_file.h"
-#include "viewer/display_loss.h"
 #include "viewer/live_picture.h"
+#include "viewer/picture_pacing.h"
 #include "viewer/seconds.h"
 #include "viewer/window.h"
 

@@ -36,8 +36,8 @@
 #include "trainer/job/scene_file.h"
 #include "trainer/run/evaluation.h"
 #include "viewer/bounds.h"
+#include "viewer/camera_path.h"
 #include "viewer/path_export.h"
-#include "viewer/turntable.h"
 
 namespace darb {
 

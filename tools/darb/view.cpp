@@ -34,8 +34,8 @@
 #include "tools/darb/stop_signals.h"
 #include "trainer/job/scene_file.h"
 #include "viewer/controls.h"
-#include "viewer/display_loss.h"
-#include "viewer/recovery.h"
+#include "viewer/picture_pacing.h"
+#include "viewer/saved_files.h"
 #include "viewer/seconds.h"
 #include "viewer/window.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "viewer/theme.h"
+#include "viewer/gui.h"
 
 namespace darb {
 

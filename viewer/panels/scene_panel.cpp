@@ -1,6 +1,5 @@
 // What is open, and how it is displayed.
 #include <imgui.h>
-
 #include <string>
 #include <vector>
 
@@ -94,6 +93,153 @@ void display_panel(Session& s) {
     panes_panel(s);
     ImGui::ColorEdit3("background", &d.background.x);
     tip("sRGB, what is seen where no splat is");
+}
+
+// The open dialog: a folder's scenes, and those that were opened last.
+
+namespace {
+
+namespace fs = std::filesystem;
+
+void go_to(const fs::path& folder, OpenDialog& dialog) {
+    dialog.folder = folder.has_filename() ? folder : folder.parent_path();
+    dialog.entries = list_folder(dialog.folder);
+}
+
+void choose(const fs::path& file, Session& s) {
+    s.ask(request::Open{file, s.open_dialog.merges});
+    s.open_dialog.shown = false;
+}
+
+void recent_scenes(Session& s) {
+    OpenDialog& dialog = s.open_dialog;
+    if (dialog.recent.empty()) return;
+    ImGui::TextDisabled("opened last");
+    for (std::size_t i = 0; i < dialog.recent.size(); ++i) {
+        const fs::path file = dialog.recent[i];
+        ImGui::PushID(static_cast<int>(i));
+        if (ImGui::Selectable(file.filename().string().c_str())) choose(file, s);
+        tip(file.string().c_str());
+        ImGui::SameLine();
+        ImGui::TextDisabled("%s", file.parent_path().string().c_str());
+        ImGui::PopID();
+    }
+    ImGui::Separator();
+}
+
+void folder_entries(Session& s) {
+    OpenDialog& dialog = s.open_dialog;
+    const std::vector<FolderEntry> entries = dialog.entries;  // a choice changes them
+    for (const FolderEntry& entry : entries) {
+        const std::string label = entry.folder ? entry.name + "/" : entry.name;
+        if (!ImGui::Selectable(label.c_str())) continue;
+        if (entry.folder)
+            go_to(dialog.folder / entry.name, dialog);
+        else
+            choose(dialog.folder / entry.name, s);
+    }
+    if (entries.empty()) ImGui::TextDisabled("no folder and no scene is in here");
+}
+
+}  // namespace
+
+void open_window(Session& s) {
+    OpenDialog& dialog = s.open_dialog;
+    if (!dialog.shown) return;
+    if (dialog.folder.empty()) {
+        std::error_code none;
+        const fs::path beside = s.scene ? s.scene->file.parent_path() : fs::path();
+        go_to(fs::absolute(beside.empty() ? fs::path(".") : beside, none).lexically_normal(),
+              dialog);
+    }
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    const float unit = s.gui_scale;
+    ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Appearing,
+                            ImVec2(0.5f, 0.5f));
+    ImGui::SetNextWindowSize(ImVec2(std::min(size.x, 520 * unit), std::min(size.y, 520 * unit)),
+                             ImGuiCond_Appearing);
+    ImGui::Begin(dialog.merges ? "Merge a scene###open" : "Open a scene###open", &dialog.shown,
+                 ImGuiWindowFlags_NoCollapse);
+    if (ImGui::Button("Up")) go_to(dialog.folder.parent_path(), dialog);
+    tip("the folder above");
+    ImGui::SameLine();
+    fs::path typed = dialog.folder;
+    ImGui::SetNextItemWidth(-FLT_MIN);
+    path_field("##folder", typed);
+    tip("a folder; type or paste");
+    if (typed != dialog.folder) go_to(typed, dialog);
+    ImGui::BeginChild("entries", ImVec2(0, 0), true);
+    recent_scenes(s);
+    folder_entries(s);
+    ImGui::EndChild();
+    ImGui::End();
+}
+
+// The list of keys and what the mouse does.
+
+namespace {
+
+struct HelpRow {
+    const char *input, *does;  // does: null where input is a heading
+};
+
+constexpr HelpRow kHelp[] = {
+    {"Camera", nullptr},
+    {"left drag", "orbit"},
+    {"right drag", "look around"},
+    {"middle or Shift+left drag", "pan"},
+    {"wheel", "zoom; in flight, speed"},
+    {"double click", "orbit around this"},
+    {"W A S D Q E", "fly"},
+    {"F, L", "frame all, level"},
+    {"[ and ]", "cameras of the data set"},
+    {"Pictures", nullptr},
+    {"drag a line", "border between photo and kernels"},
+    {"P", "save a picture"},
+    {"K, space", "add a key frame, play the path"},
+    {"space, .", "in training: pause, one step"},
+    {"Editing", nullptr},
+    {"1", "left drag orbits again"},
+    {"2, 3, 4, 5", "select: rectangle, lasso, brush, sphere"},
+    {"6, 7, 8", "move, turn, scale"},
+    {"Shift, Ctrl while selecting", "add, take away"},
+    {"Ctrl+A, Ctrl+D, Ctrl+I", "select all, nothing, the others"},
+    {"Ctrl+H, Ctrl+U", "hide the selection, show what is hidden"},
+    {"Delete", "delete the selection"},
+    {"Ctrl+Z, Ctrl+Y", "undo, redo"},
+    {"Ctrl+S, Ctrl+Q", "save, quit"},
+    {"Ctrl+O, or drop a file", "open a scene"},
+    {"Window", nullptr},
+    {"?, H, F11", "these keys, panels, full screen"},
+    {"Esc", "stop, cancel, close, leave full screen"},
+};
+
+}  // namespace
+
+void help_window(Session& s) {
+    if (!s.help) return;
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Appearing,
+                            ImVec2(0.5f, 0.5f));
+    ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), ImVec2(size.x, size.y));
+    ImGui::Begin("Keys and mouse", &s.help,
+                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
+    if (ImGui::BeginTable("keys", 2)) {
+        for (const HelpRow& row : kHelp) {
+            ImGui::TableNextRow();
+            ImGui::TableNextColumn();
+            if (row.does == nullptr) {
+                ImGui::TextDisabled("%s", row.input);
+                continue;
+            }
+            ImGui::TextUnformatted(row.input);
+            ImGui::TableNextColumn();
+            ImGui::TextUnformatted(row.does);
+        }
+        ImGui::EndTable();
+    }
+    ImGui::TextDisabled("%s", s.device_name.c_str());
+    ImGui::End();
 }
 
 }  // namespace darb

@@ -8,7 +8,6 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "viewer/turntable.h"
 
 namespace darb {
 namespace {

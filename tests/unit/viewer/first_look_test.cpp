@@ -11,7 +11,7 @@
 #include "tests/support/test_data.h"
 #include "viewer/bounds.h"
 #include "viewer/navigation.h"
-#include "viewer/remembered_up.h"
+#include "viewer/saved_files.h"
 
 namespace darb::test {
 namespace {

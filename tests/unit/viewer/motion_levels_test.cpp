@@ -1,4 +1,4 @@
-#include "viewer/motion_levels.h"
+#include "viewer/picture_pacing.h"
 
 #include <gtest/gtest.h>
 

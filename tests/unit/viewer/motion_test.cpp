@@ -1,11 +1,11 @@
 // The control of frames in motion on modelled devices, and the order of importance.
-#include "viewer/motion.h"
+#include "viewer/picture_pacing.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "viewer/importance.h"
+#include "viewer/scene.h"
 
 namespace darb {
 namespace {

@@ -8,8 +8,6 @@
 #include <fstream>
 
 #include "engine/core/error.h"
-#include "viewer/folder_list.h"
-#include "viewer/recent_files.h"
 
 namespace darb {
 namespace {

@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "engine/core/error.h"
-#include "viewer/scene_loader.h"
+#include "viewer/scene.h"
 
 namespace darb {
 namespace {

@@ -1,12 +1,12 @@
 // Which splats a stroke or a range of values has; the gizmo's handles.
-#include "viewer/select.h"
+#include "viewer/edit.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numeric>
 
-#include "viewer/gizmo.h"
+#include "viewer/tools.h"
 #include "viewer/view_camera.h"
 
 namespace darb {

@@ -1,4 +1,4 @@
-#include "viewer/theme.h"
+#include "viewer/gui.h"
 
 #include <gtest/gtest.h>
 

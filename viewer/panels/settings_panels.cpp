@@ -1,0 +1,282 @@
+// Accuracy settings and effects as switches, each choice with its measured time and error beside
+// it, each effect with the reason that the plan gives.
+#include <imgui.h>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include "viewer/panels/panels.h"
+#include "viewer/switches.h"
+
+namespace darb {
+
+namespace {
+
+std::string measured_text(const Session& s, int row, int choice) {
+    for (const MeasuredChoice& m : s.measured) {
+        if (m.row != row || m.choice != choice) continue;
+        char text[64];
+        if (std::isinf(m.psnr_db))
+            std::snprintf(text, sizeof text, "%7.2f ms   equal", m.ms);
+        else
+            std::snprintf(text, sizeof text, "%7.2f ms %5.1f dB", m.ms, m.psnr_db);
+        return text;
+    }
+    return "";
+}
+
+void choices(Session& s, int row) {
+    ImGui::PushID(row);
+    int choice = 0;
+    for (const std::string& name : row_choices(row, s.sh_degree)) {
+        if (ImGui::RadioButton(name.c_str(), chosen(row, s.display) == choice))
+            choose(row, choice, s.display);
+        tip("time on the device, ms, and PSNR to the exact picture, dB, stand beside it once "
+            "measured");
+        const std::string text = measured_text(s, row, choice++);
+        if (text.empty()) continue;
+        ImGui::SameLine(130 * s.gui_scale);
+        ImGui::TextUnformatted(text.c_str());
+    }
+    ImGui::PopID();
+}
+
+void measure_button(Session& s) {
+    if (ImGui::Button("Measure here")) s.ask(request::Measure{});
+    tip("draws the picture with each choice: its time on the device, ms, and the error of the "
+        "8-bit picture against the exact one, dB");
+}
+
+}  // namespace
+
+void accuracy_panel(Session& s) {
+    if (!ImGui::CollapsingHeader("Accuracy")) return;
+    ImGui::PushID("accuracy");
+    measure_button(s);
+    for (const int row : kAccuracyRows) {
+        ImGui::TextDisabled("%s", row_name(row).c_str());
+        choices(s, row);
+    }
+    ImGui::PopID();
+}
+
+void effects_panel(Session& s) {
+    if (!ImGui::CollapsingHeader("Effects")) return;
+    ImGui::PushID("effects");
+    measure_button(s);
+    if (s.plan) {
+        if (ImGui::Button("As planned")) s.ask(request::FollowPlan{});
+        tip("each effect on or off as darb plan says");
+    }
+    for (int effect = 0; effect < EFFECT_COUNT; ++effect) {
+        const int row = effect_row(effect);
+        bool has_switch = false;
+        for (const int other : kEffectRows) has_switch |= other == row;
+        if (!has_switch && !s.plan) continue;
+        ImGui::Separator();
+        ImGui::TextUnformatted(row_name(row).c_str());
+        if (s.plan) {
+            const EffectRow& planned = s.plan->row(effect);
+            ImGui::SameLine(90 * s.gui_scale);
+            ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
+            ImGui::TextWrapped("%s: %s", planned.on ? "on" : "off", planned.reason.c_str());
+            ImGui::PopStyleColor();
+        }
+        if (has_switch) choices(s, row);
+    }
+    ImGui::PopID();
+}
+
+// Camera: up axis, field of view, cameras of the data set, comparison with the photo.
+
+namespace {
+
+void up_axis(Session& s) {
+    Navigation& n = s.navigation;
+    if (s.up_is_guess)
+        ImGui::Text("up: %s, a guess. On its head? Flip it:", up_name(n.up).c_str());
+    else
+        ImGui::Text("up: %s (kept with --up %s)", up_name(n.up).c_str(), up_name(n.up).c_str());
+    if (ImGui::Button("Flip")) n.set_up(-n.up);
+    tip("the scene stands on its head: turn it over; remembered for the file");
+    for (int axis = 0; axis < 3; ++axis) {
+        ImGui::SameLine();
+        constexpr const char* kNames[] = {"X up", "Y up", "Z up"};
+        glm::dvec3 up(0.0);
+        up[axis] = 1;
+        if (ImGui::Button(kNames[axis])) n.set_up(up);
+        tip("this axis of the file points up; remembered for the file");
+    }
+    ImGui::SameLine();
+    if (ImGui::Button("Level")) n.level();
+    tip("takes the roll away, key L");
+}
+
+void data_set(Session& s) {
+    Photos& p = s.photos;
+    if (p.views.empty()) return;
+    const char* now = p.current < 0 ? "free" : p.views[static_cast<size_t>(p.current)].name.c_str();
+    if (ImGui::BeginCombo("data set", now)) {
+        for (int i = 0; i < static_cast<int>(p.views.size()); ++i) {
+            const View& view = p.views[static_cast<size_t>(i)];
+            ImGui::PushID(i);
+            if (ImGui::Selectable(view.name.c_str(), i == p.current))
+                s.ask(request::ChooseCamera{i});
+            ImGui::PopID();
+        }
+        ImGui::EndCombo();
+    }
+    tip("look through a camera of the data set; keys [ and ] go to the next");
+    if (p.current < 0) {
+        ImGui::TextDisabled("[ and ] step through its cameras");
+        return;
+    }
+    if (ImGui::Checkbox("photo beside the picture", &p.compare)) p.failed = false;
+    tip("the photo left of a line that can be dragged");
+}
+
+}  // namespace
+
+void camera_panel(Session& s) {
+    if (!ImGui::CollapsingHeader("Camera", ImGuiTreeNodeFlags_DefaultOpen)) return;
+    if (ImGui::Button("Frame all")) s.ask(request::FrameAll{});
+    tip("the whole scene beside this panel, key F");
+    ImGui::SameLine();
+    if (ImGui::Button("Take picture")) s.ask(request::TakePicture{});
+    tip("writes darb_001.png, or the next that is free, to the current folder, key P");
+    if (s.photos.current < 0) {
+        float degrees = static_cast<float>(glm::degrees(s.navigation.fov_y));
+        if (ImGui::SliderFloat("field of view", &degrees, 10, 120, "%.0f°", kClamped))
+            s.navigation.fov_y = glm::radians(static_cast<double>(degrees));
+        tip("over the whole height of the window, degrees");
+        float speed = static_cast<float>(s.fly_speed);
+        if (ImGui::DragFloat("fly speed", &speed, 0.01f * std::max(speed, 0.01f), 1e-4f, 1e4f,
+                             "%.3g units/s", kClamped))
+            s.fly_speed = speed;
+        tip("of W A S D Q E, in units of the scene a second; the wheel changes it in flight");
+        up_axis(s);
+    }
+    ImGui::SliderFloat("near", &s.display.near_plane, 0.001f, 10, "%.3f units", kLogarithmic);
+    tip("what is nearer to the camera is not drawn, in units of the scene");
+    data_set(s);
+}
+
+// Frames per second in motion, milliseconds of each pass.
+
+void performance_panel(Session& s) {
+    if (!ImGui::CollapsingHeader("Performance")) return;
+    const FrameTimes& t = s.times;
+    if (!t.moving_ms.empty()) {
+        const double mean = std::accumulate(t.moving_ms.begin(), t.moving_ms.end(), 0.0) /
+                            double(t.moving_ms.size());
+        ImGui::Text("in motion: %.1f frames/s (%.1f ms)", 1000 / mean, mean);
+    } else {
+        ImGui::TextDisabled("in motion: not moved yet");
+    }
+    ImGui::Text("at rest: %.1f ms", t.full_ms);
+    ImGui::Text("now: %.0f %% of the size, %.0f %% of the splats", t.quality.scale * 100,
+                t.quality.splats * 100);
+    ImGui::Text("%u visible, %u splat-tile intersections", t.visible, t.intersections);
+    double total = 0;
+    for (const PassTime& pass : t.passes) total += pass.ms;
+    for (const PassTime& pass : t.passes) {
+        ImGui::ProgressBar(total > 0 ? static_cast<float>(pass.ms / total) : 0,
+                           ImVec2(70 * s.gui_scale, 0), "");
+        ImGui::SameLine();
+        ImGui::Text("%7.2f ms  %s", pass.ms, pass.name.c_str());
+    }
+    if (!t.passes.empty()) ImGui::Text("%7.2f ms on the device", total);
+}
+
+// Camera paths: key frames, play, export.
+
+void path_panel(Session& s) {
+    if (!ImGui::CollapsingHeader("Camera path")) return;
+    PathState& p = s.path;
+    ImGui::Text("%zu key frames, %.1f s", p.path.keys.size(), p.path.duration());
+    if (ImGui::Button("Add")) p.path.add(s.navigation, p.seconds_per_key);
+    tip("a key frame where the camera is, key K");
+    ImGui::SameLine();
+    ImGui::BeginDisabled(p.path.keys.empty());
+    if (ImGui::Button("Remove last")) p.path.keys.pop_back();
+    tip("the key frame that was added last");
+    ImGui::SameLine();
+    if (ImGui::Button(p.playing ? "Stop" : "Play")) p.playing = !p.playing;
+    tip("flies along the path, key space");
+    float at = static_cast<float>(p.at_s);
+    if (ImGui::SliderFloat("time", &at, 0, static_cast<float>(std::max(p.path.duration(), 0.01)),
+                           "%.2f s", kClamped) &&
+        !p.path.keys.empty()) {
+        p.at_s = at;
+        s.ask(request::LeavePhoto{});
+        apply(p.path.sample(at), s.navigation);
+    }
+    tip("where on the path the camera is, seconds");
+    ImGui::EndDisabled();
+    ImGui::SliderFloat("per key frame", &p.seconds_per_key, 0.2f, 10, "%.1f s", kClamped);
+    tip("from the key frame before to the one that is added next");
+    path_field("path file", p.file);
+    tip("JSON; darb render --path and darb view --path read it, too");
+    if (ImGui::Button("Load")) s.ask(request::LoadPath{});
+    tip("the key frames of the path file, in the place of these");
+    ImGui::SameLine();
+    ImGui::BeginDisabled(p.path.keys.empty());
+    if (ImGui::Button("Save path")) s.ask(request::SavePath{});
+    tip("these key frames, to the path file");
+    path_field("folder", p.folder);
+    tip("of the exported frames; made where it is missing");
+    ImGui::SliderInt("frames", &p.fps, 1, 120, "%d a second", kClamped);
+    tip("of the exported video");
+    int size[2] = {p.export_width, p.export_height};
+    if (ImGui::InputInt2("size, px", size)) {
+        p.export_width = std::clamp(size[0], 16, 8192);
+        p.export_height = std::clamp(size[1], 16, 8192);
+    }
+    tip("width and height of the exported frames, px");
+    if (ImGui::Button("Export frames and video")) s.ask(request::ExportPath{});
+    tip("PNG frames, and video.mp4 where ffmpeg is installed");
+    ImGui::EndDisabled();
+}
+
+// A training run that is followed live: curves, pause, step.
+
+namespace {
+
+void curve(const char* label, const std::vector<float>& values, const char* format, float scale) {
+    if (values.empty()) return;
+    char text[64];
+    std::snprintf(text, sizeof text, format, static_cast<double>(values.back()));
+    ImGui::PlotLines("", values.data(), static_cast<int>(values.size()), 0, text, FLT_MAX, FLT_MAX,
+                     ImVec2(230 * scale, 50 * scale));
+    ImGui::SameLine();
+    ImGui::TextUnformatted(label);
+}
+
+}  // namespace
+
+void training_panel(Session& s) {
+    TrainingCurves& t = s.training;
+    if (!t.live || !ImGui::CollapsingHeader("Training", ImGuiTreeNodeFlags_DefaultOpen)) return;
+    ImGui::Text("iteration %d of %d", t.iteration, t.last_iteration);
+    ImGui::BeginDisabled(t.finished);
+    if (ImGui::Button(t.paused ? "Go on" : "Pause")) t.paused = !t.paused;
+    tip("the training, key space");
+    ImGui::SameLine();
+    if (ImGui::Button("Step")) {
+        t.paused = true;
+        ++t.steps_to_go;
+    }
+    tip("one iteration, then a pause, key .");
+    ImGui::EndDisabled();
+    ImGui::SameLine();
+    ImGui::TextDisabled(t.finished ? "finished" : "closing goes on training");
+    ImGui::PushID("curves");
+    curve("loss", t.loss, "%.4f", s.gui_scale);
+    curve("PSNR", t.psnr_db, "%.2f dB", s.gui_scale);
+    curve("held out", t.held_out_psnr_db, "%.2f dB", s.gui_scale);
+    curve("splats", t.splats, "%.0f", s.gui_scale);
+    ImGui::PopID();
+}
+
+}  // namespace darb
