@@ -126,7 +126,9 @@ TEST_F(OptionNames, a_row_is_the_same_from_the_command_line_by_name_and_from_a_s
         write_file_atomic(asked.output / kRequestFile, kept);
         const TrainRequest read = read_request(asked.output);
         EXPECT_EQ(request_text(read), kept);
-        if (!option.key.empty()) EXPECT_EQ(saved_value(option, read), saved_value(option, asked));
+        if (!option.key.empty()) {
+            EXPECT_EQ(saved_value(option, read), saved_value(option, asked));
+        }
     }
 }
 
