@@ -171,7 +171,7 @@ class Training(unittest.TestCase):
         usual = darb.Trainer(SCENE, resolution=32).options
         self.assertEqual(set(OTHER) | {"render_scale", "start_checkpoint"}, set(usual))
         switches = {"random_background": "--fixed-background"}
-        for strategy, left_out in (("adc", {"noise_lr"}),
+        for strategy, left_out in (("adc", {"noise_lr", "exposure_grid"}),
                                    ("mcmc", {"schedule", "densify_grad_threshold", "percent_dense",
                                              "opacity_reset_interval"})):
             options = {**OTHER, "strategy": strategy}
@@ -183,7 +183,7 @@ class Training(unittest.TestCase):
             subprocess.run([support.COMMAND, "train", str(SCENE), "-o", str(out), "-q",
                             "--no-report", *given], check=True, capture_output=True)
             request = json.loads((out / "request.json").read_text())
-            saved = {n.replace("-", "_"): v for part in ("data", "train", "accuracy", None)
+            saved = {n.replace("-", "_"): v for part in ("accuracy", None, "data", "train")
                      for n, v in (request[part] if part else request).items()
                      if not isinstance(v, dict)}
             asked = darb.Trainer(SCENE, **options).options

@@ -91,6 +91,7 @@ PyTrainer::PyTrainer(std::shared_ptr<PyDevice> device, const py::object& dataset
         make_trainer();
     } catch (...) {
         trainer_.reset();  // under the lock
+        if (job_.options.max_memory_bytes) device_->device().set_memory_budget(0);
         throw;
     }
 }

@@ -265,7 +265,7 @@ void add_scene(Rows& rows) {
     static const std::string kernels =
         kernel_names() +
         " (each splat learns its shape), or one of your own: \"expr: (1 - q/9)^3, support 9\"";
-    static const std::string strategies = strategy_help();
+    static const std::string strategies = strategy_help(), first(strategy_name(Strategy{}));
     rows.push_back(
         {.row = {.flags = "--kernel",
                  .group = option_group::kScene,
@@ -288,7 +288,7 @@ void add_scene(Rows& rows) {
         {.row = {.flags = "--strategy",
                  .group = option_group::kScene,
                  .help = strategies.c_str(),
-                 .usual = "adc"},
+                 .usual = first.c_str()},
          .key = "strategy",
          .take = take_strategy,
          .saved = [](const Request& r) { return std::string(strategy_name(r.train.strategy)); }});
