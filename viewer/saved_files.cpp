@@ -12,6 +12,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/scene/splat_file.h"
+#include "viewer/session.h"
 
 namespace darb {
 

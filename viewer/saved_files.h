@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "viewer/session.h"
-
 namespace darb {
+
+struct Session;
 
 class SavedFiles {
   public:
