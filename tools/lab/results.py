@@ -1,6 +1,7 @@
 """How the laboratory writes its results: JSON with a row a line, so that a file is short and a change of it is read."""
 
 import json
+import textwrap
 
 LONGEST = 240  # characters of what stands on one line
 
@@ -11,6 +12,9 @@ def text(value, indent=0):
     if len(line) <= LONGEST or not isinstance(value, (dict, list)):
         return line
     pad = "\n" + " " * (indent + 1)
+    if isinstance(value, list) and not any(isinstance(member, (dict, list, str)) for member in value):
+        lines = textwrap.wrap(line[1:-1], LONGEST, break_on_hyphens=False)
+        return "[" + pad + pad.join(lines) + "\n" + " " * indent + "]"
     if isinstance(value, dict):
         members = [f"{json.dumps(key)}: {text(member, indent + 1)}" for key, member in value.items()]
     else:
