@@ -18,7 +18,7 @@ Dataset block_dataset(const Dataset& whole, const std::vector<std::size_t>& view
 
 struct BlockStart {
     SplatModel model;          // the surroundings first
-    std::uint32_t frozen = 0;  // of these, a multiple of GpuSplats::kFrozenUnit
+    std::uint32_t frozen = 0;  // how many of them, a multiple of GpuSplats::kFrozenUnit
 };
 
 /// What is trained of a block: its cell and the margin, but for cells that are done.

@@ -40,7 +40,7 @@ struct Cell {
     }
 };
 
-/// Of the middle nine tenths of a cell's points, the share of their width that a margin takes.
+/// Width of a margin, as a share of the width that the middle nine tenths of a cell's points take.
 constexpr double kMarginShare = 0.15;
 
 struct Partition {
@@ -50,7 +50,7 @@ struct Partition {
 
     /// The one cell that a place lies in.
     std::size_t cell_of(const glm::dvec3& world) const;
-    /// Of kRounds, the one in which a cell has its turn: cells of a round touch in corners at most.
+    /// Which of the kRounds rounds trains a cell: cells of one round touch at corners at most.
     int round_of(std::size_t cell) const {
         const auto in_column = static_cast<std::size_t>(rows);
         return static_cast<int>(cell / in_column % 2 * 2 + cell % in_column % 2);
@@ -98,16 +98,17 @@ std::vector<std::vector<std::size_t>> choose_views(const std::vector<std::vector
 
 // What the parts of a run in blocks are trained with.
 
-/// That all blocks together may come to: options.max_splats, or what a run of the whole is forecast
-/// to.
+/// How many splats all blocks together may have: options.max_splats, or the forecast for a run of
+/// the whole scene.
 std::uint32_t whole_splats(const Dataset& dataset, const TrainOptions& options);
-/// Of the coarse model of so many.
+/// How many splats the coarse model has when the whole may have so many.
 std::uint32_t coarse_splats(std::uint32_t whole);
-/// Half the iterations, no view-dependent colour, an eighth of the splats.
+/// Options of the coarse model: half the iterations, no view-dependent colour, an eighth of the
+/// splats.
 TrainOptions coarse_options(const Dataset& dataset, const TrainOptions& options);
-/// Degrees of colour by the iteration, without a probe. Beside the frozen ones, the share of
-/// options.max_splats that the cell with its margin has of the points; start: what the block begins
-/// with, at least.
+/// Options of a block: the colours' degree follows the iteration, without a probe. Besides the
+/// frozen splats it may have its share of options.max_splats, by the points in the cell with its
+/// margin, but at least `start`, which it begins with.
 TrainOptions block_options(const TrainOptions& options, const CellCount& count, std::size_t points,
                            std::uint32_t frozen, std::uint32_t start);
 

@@ -26,11 +26,12 @@ namespace {
 // it.
 constexpr double kFarOff = 4;
 
-// Of splats on surfaces (docs/experiments/dense_start.md): the standard deviation along the surface
-// as a share of the distance to the next point, that across it as a share of that along.
+// For splats on surfaces (docs/experiments/dense_start.md): the standard deviation along the
+// surface as a share of the distance to the next point, and that across it as a share of that along
+// it.
 constexpr double kSurfaceWidth = 0.6, kSurfaceThickness = 0.3, kSurfaceOpacity = 0.5;
 
-// Empty: random ones.
+// The points to start from; empty where the start is random.
 const PointCloud& given_points(const Dataset& dataset, const TrainOptions& options) {
     static const PointCloud kNone;
     if (options.start == StartPoints::random) return kNone;

@@ -26,14 +26,15 @@ struct TrainJob {
     std::optional<DenseStart> start = {};    // what stereo found; run() writes and lets go of it
     std::filesystem::path resume_from = {};  // a checkpoint; empty: the run starts afresh
     std::optional<PaceForecast> pace = {};   // for the time that is left
-    // What was decided, a line for people each; may be empty.
+    // What was decided, one line of text each; may be empty.
     std::string cameras_note = {}, start_note = {}, strategy_note = {};
     std::vector<std::string> notes = {};  // options that are not used, and why
 };
 
-/// What the request comes to on this data set, the start aside. photos: as load_photos gives them,
-/// of every view; loaded here where the plan has to look at them and they are empty. looks: whether
-/// it may; a run in blocks leaves the photos to its parts. Throws Error.
+/// Works out what the request means for this data set, except for the splats to start from. photos:
+/// one of each view, as load_photos gives them; if empty, they are loaded here when the plan has to
+/// look at them. looks: whether it may look; a run in blocks leaves the photos to its parts. Throws
+/// Error.
 TrainJob resolve(TrainRequest request, Dataset dataset, std::vector<ImageU8> photos = {},
                  bool looks = true);
 

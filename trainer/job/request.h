@@ -41,7 +41,7 @@ struct TrainRequest {
     std::string tune;          // forms of passes, as parse_tuning() reads them; empty: the device's
     bool allow_mixed = false;  // ranks may have different devices
     std::vector<int> test_iterations, save_iterations, checkpoint_iterations;
-    int checkpoint_interval = 1'000;  // of checkpoint.darb; 0: only at the end and Ctrl-C
+    int checkpoint_interval = 1'000;  // iterations; 0: checkpoint only at the end and on Ctrl-C
     bool report = true;               // OUT/report.html at the end
     bool page = false;                // OUT/scene.html at the end; the command writes it
 
@@ -49,7 +49,7 @@ struct TrainRequest {
     bool resume = false;  // from OUT/checkpoint.darb
     std::filesystem::path start_checkpoint;
 
-    // Of asking alone, not saved.
+    // Not saved in request.json.
     std::filesystem::path depths;    // as 3DGS spells +depth: complete_request() takes it apart
     std::vector<std::string> given;  // options that were set by name, as "--iterations"
     std::vector<std::string> notes;  // what readers of kernels say of them

@@ -13,7 +13,7 @@ namespace darb {
 
 class GradientTree {
   public:
-    /// Of batches of so many views at most, a power of two.
+    /// For batches of at most `batch` views, a power of two.
     GradientTree(Device& device, int batch);
 
     /// Device memory of a tree of so many views, with the buffers of reserve().
@@ -25,11 +25,12 @@ class GradientTree {
     void begin() { views_ = held_ = 0; }
     /// Where the next view leaves its gradients.
     GradientBuffers& leaf() { return nodes_[static_cast<std::size_t>(held_)]; }
-    /// That view is there: adds what now has its pair.
+    /// The next view's gradients are there: adds every pair that is now complete.
     void record_view(Commands& commands);
-    /// No view follows: adds what is left, whose pair has no view, in the order of the tree.
+    /// No view follows: adds what is left without a partner, in the order of the tree.
     void record_end(Commands& commands);
-    /// Of all views, after record_end; another process's, too, once it is added.
+    /// The sum over all views, after record_end; includes another process's views once they are
+    /// added.
     GradientBuffers& sum() { return nodes_.front(); }
     /// Room for the sum of other views, to be added to that of these.
     GradientBuffers& other() { return nodes_[1]; }

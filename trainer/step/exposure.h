@@ -31,17 +31,17 @@ ColourMap fit_exposure(const ImageF& render, const ImageU8& photo, const glm::ve
 ImageF apply_exposure(const ColourMap& map, const ImageF& image, const ImageU8& photo,
                       bool alpha_is_mask);
 
-/// The step of one photo's map.
+/// One step of Adam on a photo's map.
 struct ExposureStep {
     std::uint32_t photo = 0, pixels = 0;
-    float rate = 0;  // of Adam
-    int visits = 1;  // of this photo, this one counted
+    float rate = 0;  // Adam's learning rate
+    int visits = 1;  // visits to this photo, this one included
 };
 
 /// What a map applies to.
 struct ExposedPicture {
     const Buffer& image;          // float [3][H W]
-    const Buffer& transmittance;  // float [H W], what of the background is seen
+    const Buffer& transmittance;  // float [H W], share of the background that is seen
     glm::vec3 background;
     std::uint32_t width = 0;  // px, read for grids
 };
@@ -52,11 +52,11 @@ struct ExposureMaps {
     bool grid = false;          // a grid of maps, EXPOSURE_GRID_*; false: one map
     int batch = 1;              // views of a step
     std::size_t terms() const;  // floats a photo
-    /// Of Exposure::state().
+    /// Length of Exposure::state(), floats.
     std::size_t state_size() const { return photos * terms() * 3; }
 };
 
-/// What these options train, of so many photos.
+/// The maps that these options train for so many photos.
 ExposureMaps exposure_maps(const TrainOptions& options, std::uint32_t photos);
 
 class Exposure {
@@ -81,13 +81,13 @@ class Exposure {
     void record_step(Commands& commands, const Buffer& status, const ExposureStep& step,
                      int place = 0);
 
-    /// What record_backward left for this place, and as another process has it. The queue must be
-    /// idle.
+    /// The gradient that record_backward left for this place; set_gradient puts another process's
+    /// there. The queue must be idle.
     std::vector<float> gradient(int place) const;
     std::size_t gradient_floats() const;
     void set_gradient(int place, const std::vector<float>& values);
 
-    /// Of each photo; of a grid the mean of its maps.
+    /// One map per photo; where there is a grid, the mean of its maps.
     std::vector<ColourMap> maps() const;
     /// maps and moments as one array, for checkpoints: [photos][terms], [photos][terms][2].
     std::vector<float> state() const;

@@ -88,11 +88,11 @@ class TrainingPhotos {
     int longest_side() const { return longest_side_; }       // px, of all views
     int largest_width() const { return width_; }             // px, of all views
     int largest_height() const { return height_; }           // px, of all views
-    std::uint64_t largest_photo() const { return pixels_; }  // pixels, of the training photos
+    std::uint64_t largest_photo() const { return pixels_; }  // pixels of the largest training photo
 
     /// The cameras of the training photos at their whole size, on the host.
     std::vector<gpu::CameraData> training_cameras() const;
-    /// Of the splats that the cameras see.
+    /// Origin of the splats that the cameras see (SplatModel::origin).
     const glm::dvec3& origin() const { return origin_; }
     /// The mean of their centres.
     glm::vec3 mean_centre() const;
@@ -104,7 +104,7 @@ class TrainingPhotos {
     /// idle.
     void set_divisor(int divisor);
     bool has_room_for_smaller() const { return room_for_smaller_; }
-    /// Of the smaller photos that are there now.
+    /// Pixels of all the smaller photos that are there now.
     std::uint64_t small_pixels() const;
     std::uint32_t small_cameras() const { return static_cast<std::uint32_t>(small_.data.size()); }
 
@@ -132,7 +132,7 @@ class TrainingPhotos {
     double usual_depth_ = 1;
     int longest_side_ = 1, width_ = 1, height_ = 1;
     std::uint64_t pixels_ = 1;
-    Memory memory_;  // of the photos
+    Memory memory_;  // where the photos lie
     Size whole_, small_;
     std::array<Place, 2> places_;
     bool pending_ = false;  // recorded, and not yet submitted

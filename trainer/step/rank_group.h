@@ -15,8 +15,8 @@ namespace darb {
 
 struct RankGroup {
     Ranks* all = nullptr;
-    /// Their devices may round differently: the first one's splats are taken over after each round
-    /// of density control, and in between, in place of the promise of equal bits.
+    /// Whether their devices may round differently. Then equal bits are not promised; instead all
+    /// take over the first one's splats, after each round of density control and in between.
     bool mixed = false;
 
     bool several() const { return all && all->count() > 1; }
