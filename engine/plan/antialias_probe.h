@@ -11,8 +11,8 @@
 namespace darb {
 
 struct ProbedSize {
-    double scale = 1;                    // of the sides of what was trained on
-    int width = 0, height = 0;           // px, of the first view
+    double scale = 1;                    // relative to the sides of the training photos
+    int width = 0, height = 0;           // size of the first view, px
     double without_db = 0, with_db = 0;  // mean PSNR of the held-out photos
 };
 

@@ -24,12 +24,12 @@ namespace darb {
 
 struct TuningTime {
     std::string group, choice;
-    double ms = 0;  // of the group's passes, the median of some frames
+    double ms = 0;  // time of the group's passes, the median of some frames
 };
 
 struct TuningRecord {
-    TuningNames choice;             // of every group that is measured
-    std::vector<TuningTime> times;  // of all
+    TuningNames choice;             // for every group that is measured
+    std::vector<TuningTime> times;  // one for each choice that was timed
     bool seen_in_a_run = false;     // look_again() has compared forms on the splats of a run
 };
 
@@ -37,21 +37,21 @@ struct TuningRecord {
 struct TimedFrame {
     const GpuSplats& splats;
     gpu::CameraData camera;
-    int sh_degree = 0;  // of the colours, at most the splats'
+    int sh_degree = 0;  // degree of the colours, at most the splats'
     ForwardOptions options;
 };
 
 /// Forward, loss and backward blend of one frame, by the device's tuning at construction.
 class TuningFrame {
   public:
-    /// Of the tuner's own scene: the same splats at every call, more of them where the device is
-    /// no CPU.
+    /// With the tuner's own scene: the same splats at every call, and more of them where the device
+    /// is no CPU.
     explicit TuningFrame(Device& device);
-    /// Of splats of the caller's, which must outlive it.
+    /// With the caller's splats, which must outlive it.
     TuningFrame(Device& device, const TimedFrame& frame);
 
-    /// Of each group the milliseconds of its passes together; of the whole frame where the device
-    /// has no timestamps. The first call compiles.
+    /// For each group the milliseconds of its passes together; where the device has no timestamps,
+    /// those of the whole frame. The first call compiles.
     std::vector<double> run(const std::vector<TuningGroup>& groups);
 
   private:
@@ -135,8 +135,8 @@ struct TimedForms {
 };
 
 struct TimingEffort {
-    double warm_least_s = 0, warm_most_s = 0;  // of work before the forms are timed; 0: none
-    int rounds_least = 3, rounds_most = 3;     // in each all forms take a turn
+    double warm_least_s = 0, warm_most_s = 0;  // work before the forms are timed; 0: none
+    int rounds_least = 3, rounds_most = 3;     // all forms take a turn in each
     double rounds_s = 0;                       // once these are over, no more rounds than the least
 };
 
@@ -161,7 +161,7 @@ FormTimes time_rounds(const TimedForms& forms, std::span<const std::size_t> whic
 
 struct FormChoice {
     std::size_t form = 0;
-    std::vector<double> ms;  // of each form, the median
+    std::vector<double> ms;  // median time of each form
 };
 
 /// Warms up, times all forms, and where another than the usual one is best, looks a second time at

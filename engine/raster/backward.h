@@ -53,7 +53,7 @@ class Backward {
     /// What project_backward binds beside the frame and the splats.
     struct ProjectBuffers {
         std::vector<BufferRange> state;  // moments or gradients
-        const Buffer& sums;              // of the gradients of means
+        const Buffer& sums;              // sums of the gradients of means
         BufferRange rest_sum;
     };
     void record_project(Commands& commands, const FrameView& view, const Frame& frame,

@@ -101,7 +101,7 @@ class GpuSplats {
     std::uint64_t binding_bytes_ = 0;  // the most that one binding holds
     std::array<std::uint32_t, kAttributeCount> strides_{};
     std::array<Buffer, kAttributeCount> parameters_;
-    std::array<Buffer, kAttributeCount> moments_;  // of each float first, second
+    std::array<Buffer, kAttributeCount> moments_;  // first and second moment of each float
     bool has_rest_sum_ = false;
     Buffer rest_sum_;
     Buffer smoothing_;

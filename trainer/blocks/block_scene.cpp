@@ -50,7 +50,7 @@ Dataset block_dataset(const Dataset& whole, const std::vector<std::size_t>& view
     Dataset block = whole;
     block.views.clear();
     for (const std::size_t v : views) block.views.push_back(whole.views[v]);
-    block.points.seen_begin.clear();  // they refer to the views of the whole
+    block.points.seen_begin.clear();  // refers to the views of the whole
     block.points.seen_by.clear();
     return block;
 }

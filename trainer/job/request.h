@@ -27,8 +27,8 @@ struct TrainRequest {
 
     // What it trains. Kernel, footprint, accuracy and strategy are members of `train`.
     TrainOptions train;
-    std::string preset;  // of trainer/options/presets.h, whose values are in the others; empty:
-                         // none was named
+    std::string preset;  // name in trainer/options/presets.h; the other members have its values;
+                         // empty: none was named
     std::string schedule = "darb";        // or 3dgs, whose values use_schedule() puts into `train`
     std::string effects = "auto";         // as parse_effects() reads them
     std::string refine_cameras = "auto";  // auto: as the plan of effects says; on; off

@@ -20,10 +20,10 @@ constexpr double kLastShare = 0.02;            // share of the rate at the end o
 constexpr double kIntrinsicsShare = 0.5;
 // px a visit, where tracks anchor a pose and where pictures alone are to find it.
 constexpr double kAnchoredRate_px = 0.1, kFreeRate_px = 0.5;
-constexpr std::size_t kMostTracks = 1'000;  // that anchor one photo
+constexpr std::size_t kMostTracks = 1'000;  // most tracks that anchor one photo
 constexpr double kHuberPx = 1;              // beyond this error tracks pull no harder
 constexpr std::size_t kFewestCameras = 3;
-constexpr std::size_t kPointsOfAll = 20'000;  // that size a step where there are no tracks
+constexpr std::size_t kPointsOfAll = 20'000;  // points that size a step where there are no tracks
 
 std::vector<glm::dvec3> positions(const PointCloud& points) {
     std::vector<glm::dvec3> all;
