@@ -154,7 +154,7 @@ Device* PictureDevice::get() {
 /// What every scene that a command writes has in common.
 struct SceneWriter {
     SplatFormat format;
-    const std::vector<View>& views;  // of a measure
+    const std::vector<View>& views;  // views to measure on
     PictureDevice& device;
     const WrittenFiles& files;
     const Paths& inputs;

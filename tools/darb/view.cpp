@@ -169,7 +169,7 @@ int view(ViewFlags flags) {
     if (const auto kept = state_folder(); !kept.empty()) {
         options.up_list = kept / "up.json";
         const bool window = flags.screenshot.empty() && flags.frames.empty() && flags.times.empty();
-        if (window) options.recent_list = kept / "recent.json";  // of what a person opened
+        if (window) options.recent_list = kept / "recent.json";  // what a person opened
     }
     if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())
@@ -305,7 +305,7 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
 
 namespace {
 
-constexpr double kTurn_s = 20;  // of a whole turn
+constexpr double kTurn_s = 20;  // time of a whole turn
 constexpr int kCompared = 6;    // frames in motion, each a sixth of a turn from the one before
 
 }  // namespace
@@ -367,7 +367,7 @@ std::vector<double> compare_motion(const MeasuredView& m) {
 
 namespace {
 
-constexpr double kMotion_s = 5;  // of the orbit
+constexpr double kMotion_s = 5;  // time of the orbit
 constexpr int kRests = 5;
 
 /// "VmHWM", the most memory that the process has had, bytes; 0 where the system does not say.

@@ -23,7 +23,7 @@ struct RendererKey {
     int kernel = 0;
     Footprint footprint = Footprint::psi;
     bool antialias = false, direct_colour = false, linear = false, camera = false;
-    int preset = 0;  // of accuracy
+    int preset = 0;  // accuracy preset
 
     bool operator==(const RendererKey&) const = default;
 };

@@ -31,7 +31,7 @@ class PyScene {
     // Its arrays never move, as numpy looks at them: that of shapes grows once, from none.
     SplatModel model_;
     Renderers renderers_;
-    std::shared_ptr<PyDevice> device_;  // of the renderers
+    std::shared_ptr<PyDevice> device_;  // device of the renderers
     std::uint64_t changes_ = 1;
     std::vector<std::pair<RendererKey, std::uint64_t>> uploaded_;  // changes_ at the time
 };
