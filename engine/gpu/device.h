@@ -63,7 +63,7 @@ struct Tuning {
     std::uint32_t blend_lanes = 0;  // lanes of a subgroup in both blends; 0: the device's own
     BackwardBlend backward = BackwardBlend::subgroup;
     LossWay loss = LossWay::strips;
-    bool exp_builtin = false;  // by the driver's own exp where kernels may (kEvaluationOfDevice)
+    bool exp_builtin = false;  // use the driver's own exp where kernels may (kEvaluationOfDevice)
     PhotoPlace photos = PhotoPlace::automatic;
     bool operator==(const Tuning&) const = default;
 };
@@ -158,7 +158,7 @@ class Device {
     /// Where the pipeline cache lies and whatever else was measured of this device; "" = nowhere.
     const std::filesystem::path& cache_folder() const;
 
-    /// For all objects that are made for this device from now on; usual_tuning() at first.
+    /// Applies to all objects that are made for this device from now on; usual_tuning() at first.
     void set_tuning(const Tuning& tuning);
     const Tuning& tuning() const;
 
@@ -170,7 +170,7 @@ class Device {
     void set_memory_budget(std::uint64_t bytes);
     std::uint64_t memory_budget() const;
 
-    /// With compile_only: every pipeline that was made, in order.
+    /// With compile_only, every pipeline that was made, in order.
     const std::vector<CompiledPipeline>& compiled() const;
     /// Whether the driver has statistics of pipelines.
     bool has_pipeline_statistics() const;

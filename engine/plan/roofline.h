@@ -30,7 +30,8 @@ struct PassWork {
     double fma = 0;
 };
 
-/// By the name that Forward, Loss, Exposure and Backward give a pass; nothing for others.
+/// The work of a pass, by the name that Forward, Loss, Exposure or Backward gives it; nothing for
+/// others.
 std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& counts);
 
 /// The time that the slower of the two rates needs for the work, over the time taken.

@@ -102,19 +102,18 @@ void write_tuning(const DeviceInfo& info, const std::filesystem::path& folder,
                   const TuningRecord& record);
 
 struct TuneRequest {
-    std::string forced;                            // as parse_tuning; of --tune
-    std::string environment;                       // the same, of DARB_TUNE
-    bool retune = false;                           // measure anew, known devices too
+    std::string forced;                            // from --tune, as for parse_tuning
+    std::string environment;                       // the same from DARB_TUNE
+    bool retune = false;                           // measure again, known devices too
     std::function<void(const std::string&)> note;  // may be empty
 };
 
-/// Sets the tuning of a device: what is forced, then the environment's, then the record, then the
-/// usual.
-/// Without a record a device that is not known is measured. Throws Error for unknown names.
+/// Sets the tuning of a device: what is forced, else the environment's, else the record's, else the
+/// usual one. An unknown device without a record is measured. Throws Error for unknown names.
 void tune(Device& device, const TuneRequest& request);
 
-/// The same with the environment's DARB_TUNE, and its lines on stderr. Before anything is made for
-/// the device.
+/// The same with the environment's DARB_TUNE, and its notes on stderr. To be called before anything
+/// is made for the device.
 void settle_tuning(Device& device, const std::string& forced = {}, bool retune = false);
 
 /// The choice in a line, with the milliseconds of all.

@@ -39,8 +39,8 @@ struct LossBuffers {
 
 class Loss {
   public:
-    /// For images up to max_width x max_height px. Throws Error where it goes by strips and the
-    /// device's subgroups have fewer than 4 lanes.
+    /// For images up to max_width x max_height px. Throws Error where the loss goes by strips and
+    /// the device's subgroups have fewer than 4 lanes.
     Loss(Device& device, int max_width, int max_height, const LossOptions& options = {});
 
     /// Device memory of a Loss made with these arguments.

@@ -22,7 +22,7 @@ namespace darb::gpu {
 
 struct ExposureArgs {
     uint pixels;  // H W
-    uint view;    // whose map
+    uint view;    // view whose map it is
     uint groups;  // groups of exposure_backward
     float background_r, background_g, background_b;
     uint width;  // width of the picture, px

@@ -135,7 +135,7 @@ struct BucketArgs {
     uint width;   // px
     uint height;  // px
     uint tiles_x;
-    uint records;  // that the buffers hold
+    uint records;  // records that the buffers hold
 };
 
 struct UpsampleArgs {

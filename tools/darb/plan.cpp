@@ -77,7 +77,7 @@ namespace {
 using nlohmann::json;
 
 struct PlanFlags {
-    PlanRequest plan;  // but for its kernel, which is words at first
+    PlanRequest plan;  // except for its kernel, which is words at first
     std::filesystem::path json;
     bool quiet = false, no_price = false, compare = false, probe = false;
     int probe_iterations = 400;

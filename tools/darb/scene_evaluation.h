@@ -24,7 +24,7 @@ struct SceneEvaluation {
     bool align_cameras = false;  // align each camera to its photo first, by CameraAlignment
     bool alpha_is_mask = false;  // as the data set has it
     double depth_scale = 1;      // likewise; measured depths are compared where views have them
-    Ranks* ranks = nullptr;      // that measure views in turn; null: this process does all
+    Ranks* ranks = nullptr;      // ranks that measure views in turn; null: this process does all
 };
 
 /// What a model's pictures of these views have, and their means; views: at the size to measure at.

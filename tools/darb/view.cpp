@@ -97,7 +97,7 @@ void refuse_other_pictures(const std::filesystem::path& file) {
                 "Use .png or .jpg.");
 }
 
-// As its ending says; PNG where it has none.
+// Writes the format that the name's ending says; PNG where it has none.
 void write_screenshot(const std::filesystem::path& file, const ImageU8& image) {
     if (is_jpeg_name(file))
         write_file_atomic(file, encode_jpeg(image, kJpegQuality));

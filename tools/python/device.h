@@ -42,7 +42,7 @@ class Renderers {
     /// A new one, which begins with the model.
     KeptRenderer& make(Device& device, const RendererKey& key, const SplatModel& model);
     void clear() { kept_.clear(); }
-    /// To be left behind, in a child process.
+    /// Leaves the renderers behind, in a child process.
     void leak() { static_cast<void>(new std::list<KeptRenderer>(std::move(kept_))); }
 
   private:

@@ -40,7 +40,7 @@ RendererKey key_of(const SplatModel& header, const Pictures& pictures,
     return key;
 }
 
-// From where the arrays lie, into the buffers of a call before of as many splats.
+// Copies from where the arrays lie into the buffers of an earlier call, if that had as many splats.
 void put(KeptRenderer& kept, const SplatArraysGiven& given) {
     GradientRenderer& renderer = kept.renderer;
     if (!renderer.holds(given.count(), given.header.sh_degree))

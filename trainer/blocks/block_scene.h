@@ -21,7 +21,7 @@ struct BlockStart {
     std::uint32_t frozen = 0;  // how many of them, a multiple of GpuSplats::kFrozenUnit
 };
 
-/// What is trained of a block: its cell and the margin, but for cells that are done.
+/// The region that a block trains: its cell with the margin, except for cells that are done.
 struct BlockRegion {
     const Partition& cells;
     std::size_t cell;
@@ -29,15 +29,17 @@ struct BlockRegion {
     bool holds(const glm::dvec3& world) const;
 };
 
-/// From the coarse model: its splats in the region, to train, and the others that one of the
-/// cameras may see, frozen; in place of those in the margin of cells that are done `beside`, what
-/// these have come to there. Of the coarse ones around, the few least opaque are left out that make
-/// no whole unit. sh_degree: that of the model, whose further bands are 0.
+/// A start from the coarse model: its splats in the region, to be trained, and the others that one
+/// of the cameras may see, frozen. Where the margin lies in cells that are done, `beside`, what
+/// they ended with, replaces the coarse splats. The few least opaque of the coarse ones around are
+/// left out that would not fill a unit. sh_degree: that of the result, where bands beyond the
+/// coarse model's are 0.
 BlockStart block_start(const SplatModel& coarse, const BlockRegion& region,
                        const SplatModel& beside, const std::vector<View>& views, int sh_degree);
 
-/// Behind these, to train: splats of the data set's points in the region, as a run of the whole
-/// begins with them; of more than leave `most` splats in all, a drawn part.
+/// Appends splats to train, made from the data set's points in the region as a run of the whole
+/// begins with them; where there would be more than `most` splats in all, from a random part of the
+/// points.
 void add_points(const Dataset& whole, const BlockRegion& region, const TrainOptions& options,
                 std::uint32_t most, BlockStart& start);
 

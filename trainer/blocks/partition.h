@@ -69,8 +69,8 @@ struct CellCount {
 };
 std::vector<CellCount> count_points(const Partition& cells, std::span<const double> points);
 
-/// At least `blocks` cells, as few as a grid of this kind allows, whose columns and rows are to
-/// each other about as the widths of the ground.
+/// The grid with at least `blocks` cells, as few as possible, whose numbers of columns and rows are
+/// about in the ratio of the ground's widths.
 struct Grid {
     int columns = 1, rows = 1;
 };
@@ -79,9 +79,9 @@ Grid grid_for(int blocks, const GroundPlane& plane, std::span<const double> poin
 // Which cameras a block is trained on: those in whose pictures the splats of its cell, in the
 // coarse model of the whole, make up enough.
 
-/// Share of a picture from which on its camera sees a cell enough.
+/// Share of a picture from which on its camera sees enough of a cell.
 constexpr double kLeastShare = 0.05;
-/// A cell that fewer see enough gets those that see most of it.
+/// A cell that fewer cameras see enough of gets those that see most of it.
 constexpr std::size_t kFewestViews = 3;
 
 /// [view][cell]: the mean over the picture of sum alpha T over the splats of the cell, which is

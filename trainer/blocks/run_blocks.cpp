@@ -474,7 +474,7 @@ TrainOptions coarse_options(const Dataset& dataset, const TrainOptions& options)
 TrainOptions block_options(const TrainOptions& options, const CellCount& count, std::size_t points,
                            std::uint32_t frozen, std::uint32_t start) {
     TrainOptions block = options;
-    block.probe_sh = false;  // what stands around has colours of every degree from the start
+    block.probe_sh = false;  // the surroundings have colours of every degree from the start
     if (!options.max_splats) return block;
     const double share = double(count.with_margin) / double(std::max<std::size_t>(points, 1));
     const auto own = static_cast<std::uint32_t>(share * *options.max_splats);

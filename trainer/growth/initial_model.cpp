@@ -84,7 +84,7 @@ PointCloud drawn_from(const PointCloud& cloud, std::uint32_t count, std::uint64_
             part.colour.push_back(cloud.colour[3 * order[i] + a]);
             if (!cloud.normal.empty()) part.normal.push_back(cloud.normal[3 * order[i] + a]);
         }
-        // As many cover the same surface.
+        // Fewer points cover the same surface.
         if (!cloud.spacing.empty())
             part.spacing.push_back(
                 cloud.spacing[order[i]] *

@@ -23,7 +23,7 @@ struct TrainJob {
     Dataset dataset = {};
     std::vector<ImageU8> photos = {};  // [view] where the plan had to look at them; else empty
     EffectPlan effects = {};
-    std::optional<DenseStart> start = {};    // what stereo found; run() writes and lets go of it
+    std::optional<DenseStart> start = {};    // what stereo found; run() writes it and lets go of it
     std::filesystem::path resume_from = {};  // a checkpoint; empty: the run starts afresh
     std::optional<PaceForecast> pace = {};   // for the time that is left
     // What was decided, one line of text each; may be empty.
@@ -50,7 +50,7 @@ struct JobSinks {
     bool quiet = false;                       // no progress on the terminal
     const std::atomic<bool>* stop = nullptr;  // set by others: the run saves itself and ends
     std::function<double(const LiveStep&)> on_step = {};  // see RunOptions::on_step
-    RankGroup ranks = {};                                 // that train together
+    RankGroup ranks = {};                                 // processes that train together
 };
 
 /// Trains the job into its output folder; see run_training(). Lets go of the job's photos and

@@ -61,7 +61,7 @@ ExposureMaps exposure_maps(const TrainOptions& options, std::uint32_t photos);
 
 class Exposure {
   public:
-    /// For photos of at most `pixels` pixels, all identities.
+    /// For photos of at most `pixels` pixels; all maps begin as identities.
     Exposure(Device& device, const ExposureMaps& maps, std::uint64_t pixels);
 
     /// Device memory of an Exposure made with these arguments.

@@ -116,7 +116,7 @@ class TrainingPhotos {
     };
     struct Place {
         Buffer pixels;
-        int view = -1;  // whose photo is there, after all that was recorded
+        int view = -1;  // view whose photo is there once all that was recorded has run
     };
     void upload(const View& view, const ImageU8& photo, const ImageF& depth);
     void make_smaller(ResolutionRamp& ramp, int divisor);

@@ -15,8 +15,8 @@ namespace darb {
 /// What a probe found.
 struct ProbeResult {
     int iteration = 0, degree = 0;  // degree: the one on trial
-    // On the photos set aside; NaN where nothing was measured: too few photos or a degree above
-    // the first, which admits it, or no room for it within max_memory_bytes, which refuses it.
+    // Gain on the photos set aside. NaN where nothing was measured: with too few photos or a degree
+    // above the first it is admitted, without room for it within max_memory_bytes it is refused.
     double gain_db = 0;
     bool admitted = false;
 };
