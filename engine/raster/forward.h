@@ -49,8 +49,7 @@ class Forward {
   private:
     Pipeline& project_pipeline(int sh_degree, int sh_stored);
     Pipeline& blend_pipeline(const Frame& frame);
-    /// Whether this frame is blended by records, which neither resort pixels nor leave checkpoints;
-    /// if not, a subgroup takes a block.
+    /// Whether this frame is blended by records, which neither resort pixels nor leave checkpoints.
     bool blends_records(const Frame& frame) const;
     void make_huge_pipelines();
     void record_projection(Commands& commands, const GpuSplats& splats, const FrameView& view,

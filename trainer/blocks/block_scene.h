@@ -13,7 +13,7 @@
 
 namespace darb {
 
-/// The data set with these of its views alone, all to train on, and all of its points.
+/// The data set with only these of its views, all to train on, and with all of its points.
 Dataset block_dataset(const Dataset& whole, const std::vector<std::size_t>& views);
 
 struct BlockStart {
@@ -46,7 +46,7 @@ void add_points(const Dataset& whole, const BlockRegion& region, const TrainOpti
 /// Splats behind the first `frozen` whose centres lie in the cell.
 SplatModel cut_to_cell(const SplatModel& trained, std::uint32_t frozen, const Partition& cells,
                        std::size_t cell);
-/// Those of them within the cell's margin.
+/// The splats whose centres lie in the cell or its margin.
 SplatModel cut_to_margin(SplatModel model, const Cell& cell, const GroundPlane& plane);
 
 /// All splats of the parts, in their order, with the highest of their degrees of colour.

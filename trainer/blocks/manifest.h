@@ -48,12 +48,12 @@ std::string block_name(const Partition& cells, std::size_t cell);
 
 void write_manifest(const std::filesystem::path& path, const BlocksManifest& manifest);
 
-/// What a file holds; cells: columns and rows alone, which say what they are with the data set.
+/// What a file holds. Of the cells it has columns and rows only; the data set gives the rest.
 /// Throws Error naming file and key.
 BlocksManifest read_manifest(const std::filesystem::path& path);
 
-/// Throws Error naming what differs where the manifest is of other settings or another data set,
-/// or of other blocks than were asked for (0: whatever it has).
+/// Throws Error naming what differs where the manifest is for other settings, another data set, or
+/// other blocks than were asked for (0: whatever it has).
 void check_manifest(const BlocksManifest& manifest, const std::filesystem::path& path,
                     const BlocksManifest& now, const Grid& asked);
 

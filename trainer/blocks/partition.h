@@ -91,8 +91,8 @@ std::vector<std::vector<double>> cell_shares(Device& device, const SplatModel& c
                                              const Partition& cells, const std::vector<View>& views,
                                              const ProjectionEffects& effects);
 
-/// [cell] the views, ascending, that show at least `least` of it, and of each view the cell that it
-/// shows most of; fewer than kFewestViews only where fewer show any of it.
+/// [cell]: the views, ascending, that show at least `least` of it or more of it than of any other
+/// cell. A cell has fewer than kFewestViews only where fewer show any of it.
 std::vector<std::vector<std::size_t>> choose_views(const std::vector<std::vector<double>>& shares,
                                                    double least = kLeastShare);
 

@@ -33,7 +33,7 @@ struct BlocksSummary {
     bool interrupted = false;
 };
 
-/// Throws Error where the data cannot be trained in blocks, where the manifest to resume is of
+/// Throws Error where the data cannot be trained in blocks, where the manifest to resume belongs to
 /// something else, and, after the others are done, naming each block that failed. The caller holds
 /// the RunLock of the folder.
 BlocksSummary run_blocks(const BlocksJob& job, const std::atomic<bool>& stop);

@@ -41,7 +41,7 @@ TrainJob resolve(TrainRequest request, Dataset dataset, std::vector<ImageU8> pho
 /// Whether the run begins with points that stereo finds between its photos.
 bool starts_from_stereo(const TrainJob& job);
 
-/// Finds these points, about a second of a core for each photo; begins is called before it does.
+/// Finds these points, which takes a core about a second per photo; `begins` is called first.
 /// Throws Error where the request asks for a start that the data set cannot have.
 void find_start(Device& device, TrainJob& job, const std::function<void()>& begins = {});
 
@@ -57,8 +57,8 @@ struct JobSinks {
 /// start. The caller holds the folder's RunLock.
 TrainResult run(Device& device, TrainJob& job, const JobSinks& sinks = {});
 
-/// All of it in one call: loads the data, through COLMAP where photos have no cameras, resolves the
-/// request, finds the start and trains; what `darb train` does, without what it prints. Takes and
+/// Everything in one call: loads the data, through COLMAP where photos have no cameras, resolves
+/// the request, finds the start and trains, as `darb train` does, but prints nothing. Takes and
 /// gives back the RunLock of the output folder. Throws Error.
 TrainResult train(Device& device, TrainRequest request, const JobSinks& sinks = {});
 

@@ -14,7 +14,7 @@ namespace darb {
 std::filesystem::path photos_without_cameras(const std::filesystem::path& path,
                                              const std::string& images_folder);
 
-/// What says that photos follow each other in the order of their names.
+/// What tells that photos follow each other in the order of their names.
 enum class PhotoOrder { none, times, numbers };
 
 struct PhotoList {

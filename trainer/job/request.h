@@ -78,11 +78,11 @@ std::filesystem::path checkpoint_to_resume(const TrainRequest& request);
 /// Throws Error where two things that were asked for contradict each other.
 void check_request(const TrainRequest& request);
 
-/// What was asked for and changes nothing in this run, and why, a line for people each.
+/// What was asked for but changes nothing in this run, and why, one line of text each.
 std::vector<std::string> unused_options(const TrainRequest& request);
 
-/// As JSON, for OUT/request.json. Paths are as seen from the output folder, so that folder and
-/// photos can move together. `resume` and `output` are left out.
+/// The request as JSON, for OUT/request.json. Paths are as seen from the output folder, so that
+/// folder and photos can move together. `resume` and `output` are left out.
 std::string request_text(const TrainRequest& request);
 
 /// Reads OUT/request.json back, with `resume` set. Throws Error that names the file and the entry.

@@ -21,7 +21,7 @@ class GradientTree {
     /// Buffers for these splats; where they change, what they held is gone. The queue must be idle.
     void reserve(const GpuSplats& splats);
 
-    /// Begins a batch, of no view.
+    /// Begins a batch, with no view yet.
     void begin() { views_ = held_ = 0; }
     /// Where the next view leaves its gradients.
     GradientBuffers& leaf() { return nodes_[static_cast<std::size_t>(held_)]; }
@@ -40,7 +40,7 @@ class GradientTree {
 
     Device* device_;
     std::vector<GradientBuffers> nodes_;  // sums of complete subtrees, the largest first, a leaf
-    int views_ = 0, held_ = 0;            // so far; nodes that hold something
+    int views_ = 0, held_ = 0;            // views so far; nodes that hold something
 };
 
 /// views: in the order of their places, which their inputs name; fewer than the batch at the end of
@@ -49,11 +49,11 @@ std::vector<StepOutcome> run_batch_step(TrainingStep& step, GradientTree& tree,
                                         const GpuSplats& splats, std::vector<StepInput>& views,
                                         Ranks& ranks, int batch);
 
-/// What one rank's gradients are for another: which rows any of its views showed, a bit a splat,
-/// and these rows, of the degree of harmonics in use. The queue must be idle.
+/// One rank's gradients as bytes for another: which rows any of its views showed, a bit per splat,
+/// and these rows, up to the degree of harmonics in use. The queue must be idle.
 Bytes packed_gradients(const GradientBuffers& gradients, int sh_degree);
-/// Back into buffers of as many splats; rows that are not there are 0. Throws Error where the bytes
-/// are not of such gradients.
+/// Puts such bytes back into buffers for as many splats; rows that are not there become 0. Throws
+/// Error where the bytes are not such gradients.
 void unpack_gradients(std::span<const std::byte> bytes, int sh_degree, GradientBuffers& to);
 
 }  // namespace darb

@@ -41,7 +41,8 @@ class CameraRefinement {
     /// Throws Error where fewer than three photos are trained on.
     CameraRefinement(const Dataset& dataset, const TrainOptions& options);
 
-    /// The camera of a view at its whole size, as refined; a held-out one has its intrinsics alone.
+    /// The refined camera of a view at its whole size; of a held-out one only the intrinsics are
+    /// refined.
     const Camera& camera(int view) const { return cameras_[static_cast<std::size_t>(view)]; }
 
     /// After an iteration's step of the splats; nothing happens before the run's share

@@ -20,14 +20,14 @@ namespace darb {
 using ColourMap = std::array<float, 12>;
 constexpr ColourMap kIdentityColours = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-/// Least squares of apply_exposure(map, render, photo) against the photo over the background, over
-/// pixels that count (all, or alpha of at least 128 where alpha is a mask); held to the identity by
-/// a weight of 1e-6 a pixel, so that pictures of one colour have an answer.
+/// The map that fits apply_exposure(map, render, photo) to the photo over the background by least
+/// squares, over the pixels that count (all, or alpha of at least 128 where alpha is a mask); held
+/// to the identity by a weight of 1e-6 a pixel, so that pictures of one colour have an answer.
 ColourMap fit_exposure(const ImageF& render, const ImageU8& photo, const glm::vec3& background,
                        bool alpha_is_mask);
 
-/// RGB, not clamped. Where alpha is no mask a pixel is mapped by the share that the photo's alpha
-/// says: what is behind is the background, which no exposure changes.
+/// Returns RGB, not clamped. Where alpha is no mask, a pixel is mapped by the share that the
+/// photo's alpha says: what is behind is the background, which no exposure changes.
 ImageF apply_exposure(const ColourMap& map, const ImageF& image, const ImageU8& photo,
                       bool alpha_is_mask);
 
@@ -50,8 +50,8 @@ struct ExposedPicture {
 struct ExposureMaps {
     std::uint32_t photos = 0;
     bool grid = false;          // a grid of maps, EXPOSURE_GRID_*; false: one map
-    int batch = 1;              // views of a step
-    std::size_t terms() const;  // floats a photo
+    int batch = 1;              // views in a step
+    std::size_t terms() const;  // floats per photo
     /// Length of Exposure::state(), floats.
     std::size_t state_size() const { return photos * terms() * 3; }
 };
@@ -77,7 +77,8 @@ class Exposure {
     /// gradient stays for the step of this place in the batch.
     void record_backward(Commands& commands, const ExposedPicture& picture, const Buffer& d_image,
                          const ExposureStep& step, int place = 0);
-    /// The photo's Adam step of what record_backward left. status: gpu::FrameStatus of the frame.
+    /// Takes the photo's Adam step by the gradient that record_backward left. status:
+    /// gpu::FrameStatus of the frame.
     void record_step(Commands& commands, const Buffer& status, const ExposureStep& step,
                      int place = 0);
 
@@ -99,7 +100,7 @@ class Exposure {
 
     ExposureMaps of_;
     Pipeline map_, gradient_, backward_,
-        update_;  // backward_ of grids, of one map gradient_ is both
+        update_;  // backward_: for grids; for one map gradient_ does both
     Buffer maps_, moments_, mapped_, partials_;
 };
 

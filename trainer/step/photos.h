@@ -55,9 +55,9 @@ struct TrainingView {
 
 class TrainingPhotos {
   public:
-    /// photos: as load_photos gives them, in the order of dataset.views. origin: of the splats.
-    /// stream: they wait on the host. depths: those of the views that have any go with them.
-    /// Throws Error where no view is left to train on.
+    /// photos: as load_photos gives them, in the order of dataset.views. origin: that of the
+    /// splats. stream: the photos wait on the host. depths: measured depths go with the photos of
+    /// views that have any. Throws Error where no view is left to train on.
     TrainingPhotos(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
                    const glm::dvec3& origin, bool stream, bool depths = false);
 
@@ -70,12 +70,13 @@ class TrainingPhotos {
     /// waits, with that of the view `next` after it; -1: not known. Recordings are submitted in the
     /// order of these calls.
     const Buffer& place(Commands& commands, const TrainingView& view, int next = -1);
-    /// What was recorded last goes to the queue: else the next place() copies anew.
+    /// To be called once the last recording went to the queue; otherwise the next place() copies
+    /// again.
     void submitted() { pending_ = false; }
     bool stream() const { return memory_ == Memory::waiting; }
     /// The camera of a view at its whole size.
     const Camera& camera(int view) const { return view_cameras_[view]; }
-    /// Others in place of those of all views, of the same sizes. The queue must be idle.
+    /// Replaces the cameras of all views by others of the same sizes. The queue must be idle.
     void set_cameras(const std::vector<Camera>& cameras);
     /// The name of a view.
     const std::string& name(int view) const { return names_[view]; }
@@ -85,9 +86,9 @@ class TrainingPhotos {
     /// Median of the measured depths, world units; 1 where there are none.
     double usual_depth() const { return usual_depth_; }
 
-    int longest_side() const { return longest_side_; }       // px, of all views
-    int largest_width() const { return width_; }             // px, of all views
-    int largest_height() const { return height_; }           // px, of all views
+    int longest_side() const { return longest_side_; }       // px, over all views
+    int largest_width() const { return width_; }             // px, over all views
+    int largest_height() const { return height_; }           // px, over all views
     std::uint64_t largest_photo() const { return pixels_; }  // pixels of the largest training photo
 
     /// The cameras of the training photos at their whole size, on the host.
