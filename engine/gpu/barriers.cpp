@@ -28,7 +28,7 @@ VkMemoryBarrier2 memory_barrier() {
 
 void BarrierTracker::clear() {
     states_.clear();
-    pending_.clear();  // of a pass that was refused before it was resolved
+    pending_.clear();  // left by a pass that was refused before it was resolved
     stages_ = 0;
     writes_ = 0;
 }

@@ -41,7 +41,7 @@ class BarrierTracker {
     };
     std::unordered_map<VkBuffer, State> states_;
     std::vector<BufferUse> pending_;
-    VkPipelineStageFlags2 stages_ = 0;  // of all uses so far
+    VkPipelineStageFlags2 stages_ = 0;  // stages of all uses so far
     VkAccessFlags2 writes_ = 0;
 };
 

@@ -74,7 +74,7 @@ class Buffer {
     std::string name_;
     VkBuffer buffer_ = VK_NULL_HANDLE;
     std::unique_ptr<MemoryPiece> memory_;
-    void* mapped_ = nullptr;  // of all but Memory::device
+    void* mapped_ = nullptr;  // set for all kinds but Memory::device
     void* direct_ = nullptr;  // either kind where the host may copy without staging
     std::uint64_t bytes_ = 0;
     std::uint64_t allocated_ = 0;  // bytes charged to the device

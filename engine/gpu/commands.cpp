@@ -85,7 +85,7 @@ struct Commands::State {
     void place_barriers();
     void write_timestamp();
     void finish_pass();
-    RecordedPass unnamed;  // what comes before the first
+    RecordedPass unnamed;  // what is recorded before the first pass
     RecordedPass& now() { return passes.empty() ? unnamed : passes.back(); }
     std::string here() const {
         return passes.empty() ? "pass" : "pass \"" + passes.back().name + "\"";

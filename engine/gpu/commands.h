@@ -90,9 +90,9 @@ class Commands {
     void copy(DeviceImage& from, const Buffer& to);
     /// Scaled with this filter where the sizes differ, converted where the formats do.
     void copy(DeviceImage& from, DeviceImage& to, VkFilter filter);
-    /// For what others do with it; what it holds stays.
+    /// Prepares the image for what others do with it; its contents stay.
     void change_layout(DeviceImage& image, VkImageLayout layout);
-    /// For what others record, between begin() and submit().
+    /// For commands that others record between begin() and submit().
     VkCommandBuffer handle() const;
 
     /// Ends the recording and gives it to the queue; host reads of Memory::host buffers are made

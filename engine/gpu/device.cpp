@@ -25,7 +25,7 @@ std::uint32_t lanes_by_pixels(const DeviceInfo& info, std::uint32_t chosen) {
 }
 
 Tuning usual_tuning(const DeviceInfo& info) {
-    constexpr std::uint32_t blocks = 4;  // of a tile; a subgroup a block is the best on lavapipe
+    constexpr std::uint32_t blocks = 4;  // per tile; a subgroup per block is best on lavapipe
     const bool lavapipe = info.driver.starts_with("llvmpipe");
     Tuning tuning;
     tuning.scan_by_thread = lavapipe;
@@ -438,7 +438,7 @@ DeviceInfo describe(VkPhysicalDevice device) {
     VkPhysicalDeviceDriverProperties driver{};
     driver.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES;
     driver.pNext = &subgroup;
-    VkPhysicalDeviceMaintenance4Properties buffers{};  // of Vulkan 1.3
+    VkPhysicalDeviceMaintenance4Properties buffers{};  // core since Vulkan 1.3
     buffers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES;
     buffers.pNext = &driver;
     buffers.maxBufferSize = ~VkDeviceSize{0};

@@ -22,7 +22,7 @@ enum class BackwardBlend {
     team,      // the same by a subgroup an area of the tile: blend_backward_team.comp
     buckets,   // a thread owns an intersection, from checkpoints: blend_backward_buckets.comp
     pixels,    // as a team, sums by pixels of 8 splats at a time: blend_backward_pixels.comp
-    pixels4,   // of 4 at a time, which takes less shared memory
+    pixels4,   // the same with 4 at a time, which takes less shared memory
 };
 
 /// In the order of the enum.
@@ -52,18 +52,18 @@ inline constexpr const char* kLossWays[] = {"strips", "tiles"};
 enum class PhotoPlace { automatic, resident, streamed };
 inline constexpr const char* kPhotoPlaces[] = {"auto", "resident", "streamed"};
 
-/// Each a specialization constant or a shader, but for the photos' place.
+/// Each chooses a specialization constant or a shader, except for the photos' place.
 struct Tuning {
     bool scan_by_thread = false;  // Scan::Strategy::team_is_thread
     SortScatter scatter = SortScatter::ballot;
-    std::uint32_t blend_threads = 0;  // of the forward blend's workgroup, which has a tile
+    std::uint32_t blend_threads = 0;  // size of the forward blend's workgroup, which has a tile
     // The forward blend by records of splats in shared memory, a subgroup a block of the tile:
     // blend_records.comp, where it serves (Forward::blends_records).
     bool blend_records = false;
-    std::uint32_t blend_lanes = 0;  // of a subgroup of both blends; 0: the device's own
+    std::uint32_t blend_lanes = 0;  // lanes of a subgroup in both blends; 0: the device's own
     BackwardBlend backward = BackwardBlend::subgroup;
     LossWay loss = LossWay::strips;
-    bool exp_builtin = false;  // by the driver's own exp where kernels may (kEvaluationOfDevice)
+    bool exp_builtin = false;  // use the driver's own exp where kernels may (kEvaluationOfDevice)
     PhotoPlace photos = PhotoPlace::automatic;
     bool operator==(const Tuning&) const = default;
 };
@@ -158,7 +158,7 @@ class Device {
     /// Where the pipeline cache lies and whatever else was measured of this device; "" = nowhere.
     const std::filesystem::path& cache_folder() const;
 
-    /// For all objects that are made for this device from now on; usual_tuning() at first.
+    /// Applies to all objects that are made for this device from now on; usual_tuning() at first.
     void set_tuning(const Tuning& tuning);
     const Tuning& tuning() const;
 
@@ -170,7 +170,7 @@ class Device {
     void set_memory_budget(std::uint64_t bytes);
     std::uint64_t memory_budget() const;
 
-    /// With compile_only: every pipeline that was made, in order.
+    /// With compile_only, every pipeline that was made, in order.
     const std::vector<CompiledPipeline>& compiled() const;
     /// Whether the driver has statistics of pipelines.
     bool has_pipeline_statistics() const;

@@ -43,13 +43,14 @@ class DeviceMemory {
     DeviceMemory(const DeviceMemory&) = delete;
     DeviceMemory& operator=(const DeviceMemory&) = delete;
 
-    /// For a buffer; from any thread. what: for errors. Throws NoRoom where there is not so much.
+    /// Memory for a buffer; from any thread. what: its name in errors. Throws NoRoom where there is
+    /// not enough.
     MemoryPiece take(const VkMemoryRequirements& needs, Memory kind, const std::string& what);
-    /// The same of an image, never from a block: those have other alignments beside buffers.
+    /// The same for an image, never from a block: beside buffers, images need other alignments.
     MemoryPiece take_own(const VkMemoryRequirements& needs, Memory kind, const std::string& what);
     void give_back(MemoryPiece& piece) noexcept;
 
-    /// Of the driver's, that live: blocks and pieces of their own.
+    /// How many allocations of the driver's are alive: blocks, and pieces with their own memory.
     std::uint32_t allocations() const { return allocations_; }
 
   private:

@@ -104,7 +104,7 @@ struct Device::State {
     std::unique_ptr<DeviceMemory> device_memory;  // while there is a device
 
     bool compile_only = false;
-    struct {  // of VK_KHR_pipeline_executable_properties, null without it
+    struct {  // functions of VK_KHR_pipeline_executable_properties, null without it
         PFN_vkGetPipelineExecutablePropertiesKHR properties = nullptr;
         PFN_vkGetPipelineExecutableStatisticsKHR statistics = nullptr;
     } executable;

@@ -45,7 +45,7 @@ std::string names_of_constants(const ShaderInterface& shader) {
     return names.empty() ? "none" : names;
 }
 
-// Without what others of its table are for, so that pipelines that are alike are one.
+// The key without constants that are meant for other shaders, so that equal pipelines are one.
 PipelineKey declared(PipelineKey key) {
     const ShaderInterface& shader = interface_of(key.shader);
     std::erase_if(key.constants, [&](const auto& given) {

@@ -23,7 +23,7 @@ namespace darb {
 /// The value of a specialization constant. Integers also set bool and uint constants.
 struct SpecValue {
     std::variant<std::int32_t, float> value;
-    bool shared = false;  // of a table for several passes: for_several_passes
+    bool shared = false;  // from a table for several passes: for_several_passes
 
     SpecValue() = default;
     template <class T>
@@ -69,7 +69,7 @@ class Pipeline {
   public:
     Pipeline() = default;
     /// shader: a name of the embedded table. Compiled here, or at first dispatch on lavapipe.
-    /// Of a shader that uses subgroups: require_full_subgroups asks the driver for subgroups
+    /// For a shader that uses subgroups, require_full_subgroups asks the driver for subgroups
     /// without idle lanes; where the workgroup is no multiple of the device's subgroup size, a
     /// smaller size is asked for if there is one. subgroup_size: 0 = the device's own; else one
     /// between its minimum and maximum, or kAnySubgroupSize, whose lanes may be idle.
@@ -118,7 +118,7 @@ class Pipeline {
     std::shared_ptr<const Made> made_;
 };
 
-/// Of a device's pipelines those that live. On any thread.
+/// Keys of the device's pipelines that are alive. From any thread.
 std::vector<PipelineKey> live_pipelines(const Device& device);
 
 /// Finds a device's pipelines by their keys. Private to engine/gpu.

@@ -20,7 +20,7 @@ struct PipelineStatistic {
 struct CompiledPipeline {
     std::string shader;
     std::string constants;            // those given and declared: "SH_DEGREE=3 THREADS=64"
-    std::uint32_t threads = 0;        // of a workgroup
+    std::uint32_t threads = 0;        // per workgroup
     std::uint32_t subgroup_size = 0;  // as the driver says, 0 where it does not
     double compile_ms = 0;
     std::vector<PipelineStatistic> values;  // empty where the driver has no statistics
@@ -28,10 +28,10 @@ struct CompiledPipeline {
 
 /// The quantities that drivers have names of their own for.
 struct CommonStatistics {
-    std::optional<double> registers;      // of a thread
+    std::optional<double> registers;      // per thread
     std::optional<double> spills;         // registers, or stores and loads of them
-    std::optional<double> scratch_bytes;  // private memory of a thread or wave
-    std::optional<double> shared_bytes;   // of a workgroup
+    std::optional<double> scratch_bytes;  // private memory per thread or wave
+    std::optional<double> shared_bytes;   // per workgroup
     std::optional<double> occupancy;      // subgroups that a core holds at a time
     std::optional<double> instructions;
     std::optional<double> cycles;  // static: loops once, or as the driver guesses

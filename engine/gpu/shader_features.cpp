@@ -17,7 +17,7 @@ using Feature = VkBool32& (*)(DeviceFeatures&);
 // A capability is covered by a feature, by a kind of subgroup operations, or by Vulkan 1.3 itself.
 struct Capability {
     std::uint32_t number;  // in the SPIR-V specification, section 3.31
-    const char* name;      // of the feature or operations
+    const char* name;      // name of the feature or operations
     Feature feature = nullptr;
     VkSubgroupFeatureFlags operations = 0;
 };

@@ -35,7 +35,7 @@ struct ShaderNeed {
 /// Each capability once, in order of its number. Aborts on one that this file does not know, as no
 /// device could be held to it.
 std::vector<ShaderNeed> shader_needs(std::span<const ShaderBinary> shaders);
-/// Of the embedded table, read once a process.
+/// The needs of all shaders in the embedded table, which is read once per process.
 const std::vector<ShaderNeed>& needs_of_all_shaders();
 
 /// Turns on what these needs and this project's own Vulkan calls take, nothing else: robust access,

@@ -27,10 +27,10 @@ struct ShaderInterface {
     };
 
     bool uses_subgroups = false;              // asks for the capability GroupNonUniform
-    std::vector<std::uint32_t> capabilities;  // that it asks for, in order
+    std::vector<std::uint32_t> capabilities;  // capabilities that it asks for, in order
     std::vector<Binding> bindings;            // in order of set, binding
     std::vector<Constant> constants;          // in order of id
-    std::uint32_t push_constant_bytes = 0;    // of the block, as a C++ struct of that layout
+    std::uint32_t push_constant_bytes = 0;    // size of the block, as a C++ struct of that layout
     std::array<std::uint32_t, 3> local_size{1, 1, 1};            // defaults
     std::array<std::int64_t, 3> local_size_spec_id{-1, -1, -1};  // -1 = fixed
 };

@@ -13,7 +13,7 @@ namespace darb {
 
 namespace {
 
-// Of evaluation; else the degree of the polynomial.
+// Values of the evaluation; any other is the degree of the polynomial.
 constexpr double kBuiltin = 0, kOfDevice = -1;
 constexpr double kOfFile = -1;
 

@@ -41,11 +41,11 @@ struct AccuracySetting {
     std::string_view training_remedy;         // what to use in training where a choice is not
 };
 
-/// By AccuracySettingId.
+/// Indexed by AccuracySettingId.
 std::span<const AccuracySetting> accuracy_settings();
 std::string_view preset_name(int preset);  // fast, balanced, exact
 std::optional<int> preset_from_name(std::string_view name);
-/// As after --accuracy. Throws Error where there is none of that name.
+/// The preset that --accuracy names. Throws Error where there is none of that name.
 int preset_of_option(std::string_view name);
 std::string accuracy_flag(const AccuracySetting& setting);  // "--alpha-cutoff"
 std::string accuracy_help(const AccuracySetting& setting);  // with the names of its choices

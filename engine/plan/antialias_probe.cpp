@@ -7,7 +7,8 @@ namespace darb {
 
 namespace {
 
-// At the trained size. Short runs lose more there than long ones: docs/experiments/antialiasing.md.
+// Largest loss at the trained size. Short runs lose more there than long ones:
+// docs/experiments/antialiasing.md.
 constexpr double kMostLoss_db = 1;
 
 }  // namespace

@@ -11,8 +11,8 @@
 namespace darb {
 
 struct ProbedSize {
-    double scale = 1;                    // of the sides of what was trained on
-    int width = 0, height = 0;           // px, of the first view
+    double scale = 1;                    // relative to the sides of the training photos
+    int width = 0, height = 0;           // size of the first view, px
     double without_db = 0, with_db = 0;  // mean PSNR of the held-out photos
 };
 
@@ -41,7 +41,7 @@ struct Trial {
     int iterations = 0;
     ProbedRun usual_run{}, tried_run{};
     double usual_db = 0, tried_db = 0;  // mean PSNR of the held-out photos
-    double price = 0;                   // what it takes longer, as a share: 0.1 is 10 %
+    double price = 0;                   // extra time, as a share: 0.1 is 10 %
     double gain_db() const { return tried_db - usual_db; }
     /// Where it gains more than two runs of one way differ by chance.
     bool pays() const { return gain_db() > kLeastGain_db; }

@@ -156,13 +156,13 @@ constexpr double kCentreStep_px = 1e-4;
 // Largest pixel footprint of a point over its smallest, for the reason alone: above it pictures of
 // the trained size gain by anti-aliasing, below it those of other sizes do.
 constexpr double kFootprintRatio = 2.5;
-constexpr double kFootprintShare = 0.05;  // of the points
+constexpr double kFootprintShare = 0.05;  // share of the points that must exceed the ratio
 // Exposures are off in evaluation, and those of neighbouring photos drift together: on a plush toy
 // whose gains spread by 2 % they cost 2.8 dB on held-out views.
 constexpr double kGainSpread = 0.05;
-constexpr std::size_t kGainViews = 3;              // that see a point, at least
-constexpr std::size_t kGainPoints = 20;            // of a photo, at least
-constexpr double kDarkest = 10, kBrightest = 245;  // of 255: sensors are linear in between
+constexpr std::size_t kGainViews = 3;              // photos that must see a point
+constexpr std::size_t kGainPoints = 20;            // points that a photo must have
+constexpr double kDarkest = 10, kBrightest = 245;  // out of 255; sensors are linear in between
 
 /// The largest change of a colour that band l of a splat can make over all directions:
 /// |sum c_m Y_m| <= |c| sqrt(sum Y_m^2), and sum Y_m^2 = (2 l + 1) / 4 pi.
@@ -253,8 +253,9 @@ std::optional<double> footprint(const Camera& camera, const double* point) {
     return p.z / std::max(camera.fx, camera.fy);
 }
 
-// With points the sets gained by it in the mean of 1/2, 1, 2 and 4 times the trained size, and
-// lost at most .5 dB at that size. Without points that was 1 dB and more (docs/experiments).
+// With points, the data sets gained by anti-aliasing in the mean over 1/2, 1, 2 and 4 times the
+// trained size, and lost at most 0.5 dB at that size. Without points they lost 1 dB and more
+// (docs/experiments).
 EffectRow antialias_rule(const Dataset& dataset) {
     EffectRow row;
     std::size_t wide = 0;
@@ -502,8 +503,8 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
 
 namespace {
 
-constexpr double kSmallestCutoff = 1.0 / 1024;  // of the accuracy settings: splats reach farthest
-constexpr double kSlack = 1.02, kSlack_px = 1;  // over the rounding of float32
+constexpr double kSmallestCutoff = 1.0 / 1024;  // least cut-off of any accuracy: the longest reach
+constexpr double kSlack = 1.02, kSlack_px = 1;  // allows for the rounding of float32
 // Beyond so many splats times cameras the rule would take seconds; then the clamp stays.
 constexpr std::uint64_t kMostProjections = 100'000'000;
 
@@ -562,7 +563,7 @@ bool needs_care(const Camera& camera, const gpu::CameraData& data, const Ball& b
     const glm::dvec3 p = camera.rotation * ball.centre + camera.translation;
     if (!(p.z > near * (1 - 1e-5))) return false;  // takes no part in the frame
     const double x = p.x / p.z, y = p.y / p.z;
-    constexpr double kEdge = 1e-4;  // of rounding, and of a principal point that counts as centred
+    constexpr double kEdge = 1e-4;  // for rounding, and for principal points that count as centred
     const auto inside = [&](double ratio, double low, double high) {
         const double edge = kEdge * std::max(1.0, std::abs(ratio));
         return ratio > low + edge && ratio < high - edge;

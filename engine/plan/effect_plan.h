@@ -31,7 +31,7 @@ std::vector<int> impossible_effects(EffectUse use);
 struct EffectRow {
     bool on = false;
     bool overridden = false;  // the command line said so
-    int degree = 0;           // of EFFECT_VIEW_COLOUR
+    int degree = 0;           // degree of EFFECT_VIEW_COLOUR
     double measured = 0;      // what the rule looked at; its unit stands in the reason
     std::string reason;       // a clause
 };
@@ -42,7 +42,7 @@ struct EffectPlan {
     bool on(int effect) const { return rows[static_cast<std::size_t>(effect)].on; }
     EffectRow& row(int effect) { return rows[static_cast<std::size_t>(effect)]; }
     const EffectRow& row(int effect) const { return rows[static_cast<std::size_t>(effect)]; }
-    /// Of a rendering: without the 3D filter, which training alone has.
+    /// For a rendering: without the 3D filter, which only training has.
     ProjectionEffects projection() const;
     /// Counters decide, frame by frame, where the command line does not.
     HugeSplatPath huge_splat_path() const {
@@ -53,7 +53,7 @@ struct EffectPlan {
     void note_frame(std::uint32_t huge_splats, std::uint32_t longest_list);
 
   private:
-    std::uint32_t most_huge_ = 0, longest_list_ = 0;  // of the frames that were noted
+    std::uint32_t most_huge_ = 0, longest_list_ = 0;  // maxima over the frames that were noted
 };
 
 /// "auto", "all", "none", or changes to one of them, auto where none is named: "+exposure,-sh",

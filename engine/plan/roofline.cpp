@@ -16,17 +16,17 @@ namespace darb {
 
 namespace {
 
-// Beyond the last-level cache: of most CPUs, of GPUs.
+// Larger than the last-level caches of most CPUs and of GPUs.
 constexpr std::uint64_t kCpuCopyBytes = 32u << 20, kGpuCopyBytes = 512u << 20;
 constexpr int kRuns = 4;  // the first compiles
 
-// Of a splat and an intersection, from the layouts in shaders/shared/render_args.h and Forward.
+// Bytes per splat and per intersection, from the layouts in shaders/shared/render_args.h and
+// Forward.
 constexpr double kProjectedBytes = 4 * 16;               // shape, light, bound, cover
 constexpr double kIntersectionBytes = 2 * 4 + 3 * 16;    // order, splat, and the projected splat
-constexpr double kSumsBytes = PARTIALS * sizeof(float);  // of the gradients of an intersection
+constexpr double kSumsBytes = PARTIALS * sizeof(float);  // sums of an intersection's gradients
 constexpr double kSortBytes = 4 + 8 + 8;  // a digit: histogram, scatter's read and write
-constexpr double kTouchedShare =
-    0.6;  // of a tile's four blocks that an intersection's ellipse touches
+constexpr double kTouchedShare = 0.6;     // share of a tile's four blocks that an ellipse touches
 constexpr double kPixelsOfTile = TILE_SIZE * TILE_SIZE;
 // Multiply-adds, counted in the shaders.
 constexpr double kProjectFma = 250, kProjectBackwardFma = 600, kShFma = 3;
@@ -80,7 +80,7 @@ DeviceRates measure_rates(Device& device) {
 
 std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
     const double rest = c.rest_floats;
-    const double others = splat_floats(0), floats = others + rest;  // of a splat
+    const double others = splat_floats(0), floats = others + rest;  // floats per splat
     const double samples =
         c.evaluated > 0 ? c.evaluated : c.intersections * kPixelsOfTile * kTouchedShare;
     if (pass == "project")

@@ -10,7 +10,7 @@
 namespace darb {
 
 struct DeviceRates {
-    double bytes_per_s = 0;  // of a copy between buffers, read and written bytes together
+    double bytes_per_s = 0;  // copy between buffers, bytes read and written together
     double fma_per_s = 0;    // float32 multiply-adds in registers
 };
 
@@ -20,17 +20,18 @@ DeviceRates measure_rates(Device& device);
 /// Means of the frames or iterations that a time belongs to.
 struct FrameCounts {
     double splats = 0, visible = 0, intersections = 0, pixels = 0;
-    double rest_floats = 0;  // of a splat in the buffers: 3 ((d + 1)^2 - 1) at SH degree d
+    double rest_floats = 0;  // per splat in the buffers: 3 ((d + 1)^2 - 1) at SH degree d
     double evaluated = 0;    // splat-pixels of blending; 0: estimated from the intersections
     double rest_every = 1;   // iterations between steps of these floats, as AdamStep::rest_every
 };
 
 struct PassWork {
-    double bytes = 0;  // that must be moved at least once
+    double bytes = 0;  // bytes that must be moved at least once
     double fma = 0;
 };
 
-/// By the name that Forward, Loss, Exposure and Backward give a pass; nothing for others.
+/// The work of a pass, by the name that Forward, Loss, Exposure or Backward gives it; nothing for
+/// others.
 std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& counts);
 
 /// The time that the slower of the two rates needs for the work, over the time taken.

@@ -154,7 +154,7 @@ FormChoice compare(const Device& device, const TuningGroup& group,
     return choose_form(forms, frames.size(), effort_for(device.info()), may_win);
 }
 
-// Of one group: what it takes by each of its choices, and the best of them.
+// Measures one group: the time that each of its choices takes, and the best of them.
 void measure_group(Device& device, TuningFrame& usual, const TuningGroup& group,
                    double exp_tolerance, TuningRecord& record) {
     std::vector<std::string> names{group.choices.front()};
@@ -327,7 +327,7 @@ std::optional<TuningRecord> read_tuning(const DeviceInfo& info,
         record.times.push_back({time.at("group").get<std::string>(),
                                 time.at("way").get<std::string>(), time.at("ms").get<double>()});
     return record;
-} catch (const std::exception&) {  // of a file that another hand changed
+} catch (const std::exception&) {  // another hand has changed the file
     return std::nullopt;
 }
 
@@ -383,11 +383,11 @@ namespace {
 
 constexpr double kGain = 0.97;             // less is not worth another form
 constexpr double kErrors = 2;              // standard errors that a gain must exceed
-constexpr double kWindow_s = 0.2;          // of the warm-up
-constexpr int kWindowFrames = 3;           // at least
-constexpr double kStable = 0.02;           // two windows are equal
-constexpr double kErrorOfMedian = 1.2533;  // of normal values, over that of their mean
-constexpr double kSigmaOfMad = 1.4826;     // of normal values
+constexpr double kWindow_s = 0.2;          // least length of a window of the warm-up
+constexpr int kWindowFrames = 3;           // frames in a window, at least
+constexpr double kStable = 0.02;           // relative difference up to which two windows are equal
+constexpr double kErrorOfMedian = 1.2533;  // standard error over that of the mean, normal values
+constexpr double kSigmaOfMad = 1.4826;     // standard deviation over the MAD, normal values
 
 double median_of(std::vector<double> values) {
     if (values.empty()) return 0;

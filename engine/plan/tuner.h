@@ -24,12 +24,12 @@ namespace darb {
 
 struct TuningTime {
     std::string group, choice;
-    double ms = 0;  // of the group's passes, the median of some frames
+    double ms = 0;  // time of the group's passes, the median of some frames
 };
 
 struct TuningRecord {
-    TuningNames choice;             // of every group that is measured
-    std::vector<TuningTime> times;  // of all
+    TuningNames choice;             // for every group that is measured
+    std::vector<TuningTime> times;  // one for each choice that was timed
     bool seen_in_a_run = false;     // look_again() has compared forms on the splats of a run
 };
 
@@ -37,21 +37,21 @@ struct TuningRecord {
 struct TimedFrame {
     const GpuSplats& splats;
     gpu::CameraData camera;
-    int sh_degree = 0;  // of the colours, at most the splats'
+    int sh_degree = 0;  // degree of the colours, at most the splats'
     ForwardOptions options;
 };
 
 /// Forward, loss and backward blend of one frame, by the device's tuning at construction.
 class TuningFrame {
   public:
-    /// Of the tuner's own scene: the same splats at every call, more of them where the device is
-    /// no CPU.
+    /// With the tuner's own scene: the same splats at every call, and more of them where the device
+    /// is no CPU.
     explicit TuningFrame(Device& device);
-    /// Of splats of the caller's, which must outlive it.
+    /// With the caller's splats, which must outlive it.
     TuningFrame(Device& device, const TimedFrame& frame);
 
-    /// Of each group the milliseconds of its passes together; of the whole frame where the device
-    /// has no timestamps. The first call compiles.
+    /// For each group the milliseconds of its passes together; where the device has no timestamps,
+    /// those of the whole frame. The first call compiles.
     std::vector<double> run(const std::vector<TuningGroup>& groups);
 
   private:
@@ -102,19 +102,18 @@ void write_tuning(const DeviceInfo& info, const std::filesystem::path& folder,
                   const TuningRecord& record);
 
 struct TuneRequest {
-    std::string forced;                            // as parse_tuning; of --tune
-    std::string environment;                       // the same, of DARB_TUNE
-    bool retune = false;                           // measure anew, known devices too
+    std::string forced;                            // from --tune, as for parse_tuning
+    std::string environment;                       // the same from DARB_TUNE
+    bool retune = false;                           // measure again, known devices too
     std::function<void(const std::string&)> note;  // may be empty
 };
 
-/// Sets the tuning of a device: what is forced, then the environment's, then the record, then the
-/// usual.
-/// Without a record a device that is not known is measured. Throws Error for unknown names.
+/// Sets the tuning of a device: what is forced, else the environment's, else the record's, else the
+/// usual one. An unknown device without a record is measured. Throws Error for unknown names.
 void tune(Device& device, const TuneRequest& request);
 
-/// The same with the environment's DARB_TUNE, and its lines on stderr. Before anything is made for
-/// the device.
+/// The same with the environment's DARB_TUNE, and its notes on stderr. To be called before anything
+/// is made for the device.
 void settle_tuning(Device& device, const std::string& forced = {}, bool retune = false);
 
 /// The choice in a line, with the milliseconds of all.
@@ -135,8 +134,8 @@ struct TimedForms {
 };
 
 struct TimingEffort {
-    double warm_least_s = 0, warm_most_s = 0;  // of work before the forms are timed; 0: none
-    int rounds_least = 3, rounds_most = 3;     // in each all forms take a turn
+    double warm_least_s = 0, warm_most_s = 0;  // work before the forms are timed; 0: none
+    int rounds_least = 3, rounds_most = 3;     // all forms take a turn in each
     double rounds_s = 0;                       // once these are over, no more rounds than the least
 };
 
@@ -161,7 +160,7 @@ FormTimes time_rounds(const TimedForms& forms, std::span<const std::size_t> whic
 
 struct FormChoice {
     std::size_t form = 0;
-    std::vector<double> ms;  // of each form, the median
+    std::vector<double> ms;  // median time of each form
 };
 
 /// Warms up, times all forms, and where another than the usual one is best, looks a second time at

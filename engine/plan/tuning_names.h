@@ -40,18 +40,18 @@ TuningNames checkpoint_tuning(const DeviceInfo& info, std::string_view text,
 /// In the same form, in the order of the groups.
 std::string names_text(const TuningNames& names);
 
-/// Of every group.
+/// The choice for every group.
 TuningNames tuning_names(const Tuning& tuning);
 /// names as parse_tuning gives them.
 Tuning with_names(Tuning tuning, const TuningNames& names);
-/// The tuning of who goes on with what began with this text: the same bits. Lanes that it does not
-/// name were the device's own, exp that it does not name a polynomial, and blend no records. Throws
-/// as parse_tuning.
+/// The tuning for whoever goes on with a run that began with this text: it leads to the same bits.
+/// If the text does not name them, the lanes were the device's own, exp was a polynomial, and blend
+/// was not by records. Throws as parse_tuning.
 Tuning resumed_tuning(const DeviceInfo& info, Tuning tuning, std::string_view text,
                       const std::string& where);
 
-/// Of the groups that change bits, as text: what a run must keep to repeat, and the blend where it
-/// is by records. Without exp it is a polynomial, as in older files.
+/// The choices of the groups that change bits, as text: what a run must keep to be repeated, and
+/// the blend where it is by records. exp is left out where it is a polynomial, as in older files.
 std::string result_tuning(const Device& device);
 
 }  // namespace darb

@@ -15,24 +15,24 @@
 namespace darb {
 
 struct AdamStep {
-    /// Of each attribute, by its number; as adam_step() leaves them, divided by 1 - beta1^t.
+    /// Learning rates by the number of the attribute, as adam_step() leaves them: divided by 1 -
+    /// beta1^t.
     std::array<float, kAttributeCount> rate{};
     float inverse_sqrt_correction2 = 1;
-    // Weights of the mean opacity and the mean scale in the loss; of the splats that the frame
-    // shows, or of all.
+    // Weights in the loss of the mean opacity and the mean scale, over the splats that the frame
+    // shows or over all.
     float opacity_weight = 0, scale_weight = 0;
-    // Share of the step's views at which they act on what a view does not show, too.
+    // Share of the step's views in which they also act on splats that the view does not show.
     float regularise_unseen = 0;
-    float largest_log_scale = std::numeric_limits<float>::max();  // none grows beyond it
+    float largest_log_scale = std::numeric_limits<float>::max();  // no scale grows beyond it
     float clearance = 0;  // world: splats nearer to the camera fade
-    // Harmonics above the first band make a step in every so many iterations, of the mean gradient
-    // of these; more than 1 takes splats that hold such means.
+    // Harmonics above the first band take one step in so many iterations, by the mean gradient over
+    // these; more than 1 needs splats that hold such means.
     int rest_every = 1;
-    int rest = REST_EACH;  // what that is in this iteration, REST_*
-    /// Others than these are AdamUpdate's alone: the step within the backward pass has them built
-    /// in.
+    int rest = REST_EACH;  // what they do in this iteration, REST_*
+    /// Only AdamUpdate takes other values: the step within the backward pass has these built in.
     double beta1 = 0.9, beta2 = 0.999;
-    double rest_beta1 = 0.9, rest_beta2 = 0.999;  // of the harmonics above the first band
+    double rest_beta1 = 0.9, rest_beta2 = 0.999;  // for the harmonics above the first band
 };
 
 /// rates: plain learning rates; t: the number of this step, from 1.
@@ -45,9 +45,9 @@ class GpuSplats;
 /// Throws Error where splats lack what the step needs: moments, a sum of harmonics' gradients.
 void check_trainable(const GpuSplats& splats, const AdamStep& step);
 
-// AdamUpdate: the step of the optimiser from gradients in buffers, which may be of several views,
-// of other processes or a caller's own. For one view it is the step that Backward::record makes, to
-// rounding: Adam with bias correction (Kingma and Ba 2015), the regularisers, the largest scale,
+// AdamUpdate: the optimiser's step from gradients in buffers, which may come from several views,
+// from other processes or from a caller. For one view it is the step that Backward::record makes,
+// to rounding: Adam with bias correction (Kingma and Ba 2015), the regularisers, the largest scale,
 // the fading of what stands too near to a camera, and the harmonics' step in every so many
 // iterations.
 

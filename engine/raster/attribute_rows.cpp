@@ -15,13 +15,13 @@ namespace {
 constexpr std::size_t kBlockRows = ROW_BLOCK, kColumnFloats = 4, kBlocksOfPiece = 512;
 constexpr std::size_t kColumnBytes = kColumnFloats * sizeof(float);
 
-// Bytes from the begin of the buffer.
+// In bytes from the beginning of the buffer.
 std::size_t column_at(const AttributeRows& rows, std::size_t row, std::size_t column) {
     return ((row / kBlockRows * rows.columns + column) * kBlockRows + row % kBlockRows) *
            kColumnBytes;
 }
 
-// Of the floats of a splat in a column; 0 beyond the last.
+// How many of a splat's floats lie in a column; 0 beyond the last.
 std::size_t floats_in(const AttributeRows& rows, std::size_t column) {
     return std::min(kColumnFloats,
                     rows.floats - std::min<std::size_t>(column * kColumnFloats, rows.floats));
@@ -55,12 +55,12 @@ BufferRange bound_rows(const Buffer& buffer, const AttributeRows& rows, const Sp
 
 namespace {
 
-// What lies row by row; `to` is where the first of the rows comes.
+// Writes what lies row by row; `to` is where the first row goes.
 void put_plain(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t count,
                std::byte* to, FloatStream& stream) {
     if (pitch == rows.floats && can_stream(to))
         return stream.floats(to, values, count * rows.floats);
-    constexpr std::size_t kColour = 3;  // of a length that is known, as a copy of so few is a word
+    constexpr std::size_t kColour = 3;  // a known length, so that the copy of so few is inlined
     for (std::size_t i = 0; i < count; ++i)
         if (rows.floats == kColour)
             stream.plain(to + i * kColour * sizeof(float), values + i * pitch, kColour);

@@ -34,22 +34,24 @@ inline std::vector<SplatRange> splat_ranges(std::uint32_t count, std::uint32_t f
 }
 
 struct AttributeRows {
-    std::uint32_t floats = 0;   // of a splat, in SplatModel's order
-    std::uint32_t columns = 0;  // vec4 of a splat that lies in blocks; 0: row by row
+    std::uint32_t floats = 0;   // floats per splat, in SplatModel's order
+    std::uint32_t columns = 0;  // vec4 per splat where splats lie in blocks; 0: row by row
 
-    /// What a splat takes, padding included.
+    /// Floats that a splat takes, padding included.
     std::uint32_t floats_held() const { return columns > 0 ? 4 * columns : floats; }
     /// Whole blocks of splats.
     std::uint64_t rows_held(std::uint64_t splats) const;
     std::uint64_t bytes(std::uint64_t splats) const;
 };
 
-/// Of an attribute of so many floats a splat; of_each: 2 for moments, first and second of each.
+/// For an attribute of so many floats a splat; of_each: values per float, 2 for moments (first,
+/// second).
 AttributeRows attribute_rows(int attribute, std::uint32_t floats, std::uint32_t of_each = 1);
 
 /// The rows of a range of splats, which begins as splat_ranges() has it.
 BufferRange range_of_rows(const Buffer& buffer, const AttributeRows& rows, const SplatRange& range);
-/// The same of what lies in blocks, the others whole, as what a frame holds of a splat is wider.
+/// The same where splats lie in blocks; else the whole buffer, as what a frame holds of a splat is
+/// wider.
 BufferRange bound_rows(const Buffer& buffer, const AttributeRows& rows, const SplatRange& range);
 
 /// Writes the rows [first, first + count) of [N][floats], whose rows are `pitch` floats apart, to

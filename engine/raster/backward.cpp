@@ -135,7 +135,7 @@ void Backward::record_gradients(Commands& commands, const FrameView& view, const
     for (const SplatRange& range : splats.ranges()) {
         args.first_splat = range.first;
         args.splat_end = range.first + range.count;
-        // In place of a sum of harmonics, which is not touched.
+        // The camera's buffer is bound in place of a sum of harmonics, which is not touched.
         const BufferRange rest =
             camera ? BufferRange(*camera) : bound_rows(to.of(kShRest), to.rows(kShRest), range);
         ProjectBuffers extra{{}, to.views(), rest};

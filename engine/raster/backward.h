@@ -18,9 +18,9 @@ namespace darb {
 /// Where gradients go.
 struct GradientTarget {
     GradientBuffers& to;
-    bool add = false;  // to what it holds, else in its place
-    /// float [N][CAMERA_SHARES], where options.camera_gradient asks for it, without add: what
-    /// shaders/backward/camera_gradient.glsl leaves.
+    bool add = false;  // add to what it holds, else replace it
+    /// float [N][CAMERA_SHARES], what shaders/backward/camera_gradient.glsl leaves; only where
+    /// options.camera_gradient asks for it, and without add.
     const Buffer* camera = nullptr;
 };
 
@@ -34,8 +34,8 @@ class Backward {
     /// Device memory beside a frame of this size.
     static FrameBytes device_bytes(const FrameSize& size);
 
-    /// With the Adam step, as one view alone makes it. d_image: float [3][H][W]. splats must have
-    /// moments; what the view shows of each is added to gradient_sum().
+    /// The gradients of one view, and at once its Adam step. d_image: float [3][H][W]. splats must
+    /// have moments; what the view shows of each is added to gradient_sum().
     void record(Commands& commands, const FrameView& view, const Frame& frame, GpuSplats& splats,
                 const Buffer& d_image, const AdamStep& step);
     /// The same into `target`; splats stay as they are and need no moments.
@@ -53,7 +53,7 @@ class Backward {
     /// What project_backward binds beside the frame and the splats.
     struct ProjectBuffers {
         std::vector<BufferRange> state;  // moments or gradients
-        const Buffer& sums;              // of the gradients of means
+        const Buffer& sums;              // sums of the gradients of means
         BufferRange rest_sum;
     };
     void record_project(Commands& commands, const FrameView& view, const Frame& frame,
@@ -63,7 +63,7 @@ class Backward {
     Device* device_;
     ForwardOptions options_;
     BlendBackward blend_;
-    // By degree, that of the buffers, UPDATE_* and REST_*.
+    // Keyed by the degree in use, that of the buffers, UPDATE_* and REST_*.
     std::map<std::array<int, 4>, Pipeline> project_;
     std::uint32_t splat_capacity_ = 0;
     Buffer gradient_sum_;

@@ -67,7 +67,7 @@ void BlendBackward::make_pipelines(bool segmented) {
     constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     constants["BUCKET"] = static_cast<std::int32_t>(bucket_length(*device_));
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window_intersections_);
-    constants = for_several_passes(std::move(constants));  // of all methods
+    constants = for_several_passes(std::move(constants));  // each method uses some of them
     segmented_ = segmented;
     if (is_by_pixels(method_)) {
         make_by_pixels(std::move(constants));

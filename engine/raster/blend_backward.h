@@ -53,11 +53,11 @@ class BlendBackward {
     Device* device_;
     ForwardOptions options_;
     BackwardBlend method_;
-    Pipeline blend_;                         // of every method
-    Pipeline bucket_tiles_, bucket_behind_;  // of buckets
+    Pipeline blend_;                         // used by every method
+    Pipeline bucket_tiles_, bucket_behind_;  // for buckets
     bool segmented_ = false;                 // whether the pipelines take segments
-    Buffer behind_;                          // pixels' state between their dispatches
-    Buffer bucket_tile_, bucket_rest_;       // of buckets
+    Buffer behind_;                          // state of the pixels between their dispatches
+    Buffer bucket_tile_, bucket_rest_;       // for buckets
     std::uint32_t capacity_ = 0, window_intersections_ = 0;
     Buffer partials_, rest_, exponent_;
 };

@@ -20,7 +20,7 @@ class CameraSums {
     void reserve(std::uint32_t splats);
     static std::uint64_t device_bytes(std::uint64_t splats);
 
-    /// Of GradientTarget::camera.
+    /// The buffer to pass as GradientTarget::camera.
     Buffer& shares() { return shares_; }
     /// After Backward::record_gradients. d_position: float [N][3].
     void record(Commands& commands, std::uint32_t splats, const Buffer& d_position);

@@ -49,7 +49,7 @@ class Forward {
   private:
     Pipeline& project_pipeline(int sh_degree, int sh_stored);
     Pipeline& blend_pipeline(const Frame& frame);
-    /// By records, which neither resort pixels nor leave checkpoints: else a subgroup a block.
+    /// Whether this frame is blended by records, which neither resort pixels nor leave checkpoints.
     bool blends_records(const Frame& frame) const;
     void make_huge_pipelines();
     void record_projection(Commands& commands, const GpuSplats& splats, const FrameView& view,
@@ -62,13 +62,13 @@ class Forward {
 
     Device* device_;
     ForwardOptions options_;
-    bool records_;                                     // by the device's tuning, as what follows
-    std::uint32_t blend_threads_;                      // of a tile's workgroup
+    bool records_;                                     // by the device's tuning, like the next
+    std::uint32_t blend_threads_;                      // threads of a tile's workgroup
     std::map<std::pair<int, int>, Pipeline> project_;  // by SH degree in use and in the buffers
     Pipeline compact_, gather_counts_, groups_visible_, groups_intersections_, emit_, tile_ranges_,
         list_lengths_;
-    std::array<Pipeline, 2> blend_;                    // made when needed; of whole lists, of parts
-    std::optional<Pipeline> depth_light_;              // made when a depth image is first asked for
+    std::array<Pipeline, 2> blend_;        // made when needed: for whole lists, for parts
+    std::optional<Pipeline> depth_light_;  // made when a depth image is first asked for
     std::optional<Pipeline> emit_others_, emit_huge_;  // made when a frame first has huge splats
 };
 

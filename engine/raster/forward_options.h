@@ -35,7 +35,7 @@ inline constexpr int kNoEffect = -1;
 /// A row for each switch: plans, options, files and the viewer follow this table.
 struct ProjectionSwitch {
     bool ProjectionEffects::*on;
-    ConstantName constant;   // of shaders/effects/constants.glsl
+    ConstantName constant;   // in shaders/effects/constants.glsl
     int effect = kNoEffect;  // EFFECT_* that turns it on
 };
 inline constexpr ProjectionSwitch kProjectionSwitches[] = {
@@ -68,7 +68,7 @@ struct ForwardOptions {
     int polynomial_degree = 5;
     float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
-    int storage = STORAGE_FLOAT32;         // of projected splats
+    int storage = STORAGE_FLOAT32;         // how projected splats are stored
     int depth_order = DEPTH_ORDER_CENTRE;  // DEPTH_ORDER_PIXEL: forward only
     ProjectionEffects effects;
     bool store_for_backward = false;

@@ -16,18 +16,18 @@ namespace darb {
 /// What the buffers of a frame are made for.
 struct FrameSize {
     std::uint32_t splats = 0, intersections = 0;
-    std::uint64_t pixels = 0;         // of the largest image
-    std::uint32_t tiles = 0;          // of the image with the most
+    std::uint64_t pixels = 0;         // pixels of the largest image
+    std::uint32_t tiles = 0;          // tiles of the image with the most
     std::uint32_t list_segments = 1;  // dispatches of the blend passes, LIST_SEGMENT of a list each
     bool cooperates = false;          // some frame had huge splats
-    std::uint32_t bucket = 0;         // intersections of a checkpoint; 0: there are none
+    std::uint32_t bucket = 0;         // intersections per checkpoint; 0: there are none
     bool shaped = false;              // the kernel has shapes
-    bool depth_sum = false;           // as ForwardOptions
-    /// Of a checkpoint.
+    bool depth_sum = false;           // as in ForwardOptions
+    /// Size of a checkpoint.
     std::uint64_t record_bytes() const {
         return CHECKPOINT_BYTES + (depth_sum ? TILE_SIZE * TILE_SIZE * sizeof(float) : 0);
     }
-    /// Of every tile one more than its full buckets.
+    /// For every tile one more than its full buckets.
     std::uint64_t checkpoint_records() const {
         return bucket > 0 ? intersections / bucket + std::uint64_t{tiles} : 0;
     }
@@ -56,11 +56,11 @@ struct FrameCounters {
 /// What the projection leaves of each splat, [N] each, and the order of depth.
 struct ProjectedSplats {
     Buffer shape, light, bound;              // as shaders/lib/projected.glsl reads them
-    Buffer exponent;                         // of a kernel with shapes; else a word
+    Buffer exponent;                         // for a kernel with shapes; else one word
     Buffer cover, intersection_count;        // the tiles that a splat meets
     Buffer visible, visible_offset;          // 0 or 1, and its sum over the splats before
-    Buffer depth_key, splat_from_depth;      // of the visible ones, nearest first
-    Buffer count_by_depth, offset_by_depth;  // of intersections, in that order
+    Buffer depth_key, splat_from_depth;      // visible splats only, nearest first
+    Buffer count_by_depth, offset_by_depth;  // numbers of intersections, in that order
     Buffer first_intersection;               // by splat: where its intersections begin
 };
 

@@ -151,7 +151,7 @@ std::uint32_t FrameBuffers::max_intersections(const Device& device) {
 }
 
 std::uint32_t FrameBuffers::max_intersections(const Device& device, BackwardBlend backward) {
-    // Of the checkpoints' records half are left for the tiles, whose last buckets are not full.
+    // Half of the checkpoint records are left for the tiles, whose last buckets are not full.
     std::uint64_t most =
         std::min(most_intersections(device), BlendBackward::max_intersections(device));
     if (backward == BackwardBlend::buckets)

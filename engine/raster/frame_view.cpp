@@ -74,7 +74,7 @@ void check_frame(const Device& device, int width, int height, const std::string&
     const std::uint64_t pixels = std::uint64_t(width) * height,
                         most = max_frame_pixels(device, planes);
     if (pixels <= most) return;
-    // As a width, which means the same whatever -r was; less what the height is rounded up by.
+    // A width, which means the same whatever -r was, less what the height is rounded up by.
     const int fitting = static_cast<int>(std::sqrt(double(most) * width / height)) - 2;
     throw NoRoom(
         camera.empty() ? "frame" : fmt::format("camera \"{}\"", camera),

@@ -19,7 +19,7 @@ struct FrameView {
     gpu::CameraData camera{};
     const Buffer* cameras = nullptr;  // gpu::CameraData[]: `camera` is the one at `index`
     std::uint32_t index = 0;
-    int sh_degree = 0;  // of the colours, at most the splats'
+    int sh_degree = 0;  // degree of the colours, at most the splats'
     glm::vec3 background{0.0f};
 };
 

@@ -43,7 +43,8 @@ class GpuSplats {
     Buffer& moments(int attribute) { return moments_[attribute]; }
     const Buffer& moments(int attribute) const { return moments_[attribute]; }
 
-    /// As kShRest, where has_rest_sum(): gradients since their last step.
+    /// Sum of the gradients of kShRest since their last step, in the same layout; only where
+    /// has_rest_sum().
     Buffer& rest_sum() { return rest_sum_; }
     bool has_rest_sum() const { return has_rest_sum_; }
 
@@ -66,8 +67,9 @@ class GpuSplats {
     /// the optimizer and no round of density control touches them, and they stay the first.
     void freeze(std::uint32_t count);
     std::uint32_t frozen() const { return frozen_; }
-    static constexpr std::uint32_t kFrozenUnit = 64;  // whose rows begin where bindings may
-    /// The rows of the others, of so many floats each, which do not lie in blocks.
+    static constexpr std::uint32_t kFrozenUnit = 64;  // bindings may begin at such multiples
+    /// The rows of the splats behind the frozen ones, of so many floats each; not for rows in
+    /// blocks.
     BufferRange trained(const Buffer& rows, std::uint32_t floats) const {
         return {rows, std::uint64_t{frozen_} * floats * sizeof(float)};
     }
@@ -101,7 +103,7 @@ class GpuSplats {
     std::uint64_t binding_bytes_ = 0;  // the most that one binding holds
     std::array<std::uint32_t, kAttributeCount> strides_{};
     std::array<Buffer, kAttributeCount> parameters_;
-    std::array<Buffer, kAttributeCount> moments_;  // of each float first, second
+    std::array<Buffer, kAttributeCount> moments_;  // first and second moment of each float
     bool has_rest_sum_ = false;
     Buffer rest_sum_;
     Buffer smoothing_;

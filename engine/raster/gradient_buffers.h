@@ -16,7 +16,7 @@ namespace darb {
 class GradientBuffers {
   public:
     GradientBuffers() = default;
-    /// For splats of this count and these attributes; all zero, of no view.
+    /// For splats of this count and these attributes; all zero, as the sum over no view.
     GradientBuffers(Device& device, const GpuSplats& splats);
     /// Whether these are for splats of such counts.
     bool is_of(const GpuSplats& splats) const;
@@ -27,7 +27,7 @@ class GradientBuffers {
     AttributeRows rows(int attribute) const {
         return attribute_rows(attribute, strides_[attribute]);
     }
-    /// In rows(); zero beyond the degree of harmonics in use.
+    /// Gradients in the layout of rows(); zero beyond the degree of harmonics in use.
     Buffer& of(int attribute) { return gradients_[attribute]; }
     const Buffer& of(int attribute) const { return gradients_[attribute]; }
     /// [N][2]: sum over the views of |dL/dmean| in NDC units, and how many showed the splat;
@@ -38,7 +38,7 @@ class GradientBuffers {
     /// As GpuSplats::bind_parameters.
     void bind(const SplatRange& range, std::vector<BufferRange>& to) const;
 
-    /// All to zero.
+    /// Sets all to zero.
     void record_clear(Commands& commands) const;
     /// These += other, of the same splats. Throws Error where they are not.
     void record_add(Commands& commands, const GradientBuffers& other);

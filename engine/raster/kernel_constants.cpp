@@ -25,7 +25,7 @@ constexpr ConstantName kCoefficients[] = {"KERNEL_C0", "KERNEL_C1", "KERNEL_C2",
                                           "KERNEL_C3", "KERNEL_C4", "KERNEL_C5",
                                           "KERNEL_C6", "KERNEL_C7", "KERNEL_C8"};
 
-/// Of the second kernel of a blend, and what the same is of the first.
+/// The name of a constant of a blend's second kernel, and that of the same constant of the first.
 struct NameInBlend {
     ConstantName second, first;
 };
@@ -88,7 +88,7 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
     if (k.form == KERNEL_FORM_RINGS) evaluation = EVALUATION_BUILTIN;
     double margin = evaluation == EVALUATION_BUILTIN ? kBuiltinMargin : kRoundingMargin;
     const bool shaped = kernel_has_shape(kernel);
-    if (shaped) margin = kBuiltinMargin;  // of log2 and exp2 in the reach
+    if (shaped) margin = kBuiltinMargin;  // for log2 and exp2 in the reach
     // The exponential's power goes through the polynomial twice: its error is that of ln w, times
     // it.
     const double passes = k.form == KERNEL_FORM_EXPONENTIAL ? 2 - std::log(alpha_cutoff) : 1.5;

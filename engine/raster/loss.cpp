@@ -42,7 +42,7 @@ gpu::LossArgs tiles(int width, int height) {
 }
 
 int cluster_lanes(const Device& device) {
-    const std::uint32_t size = device.info().subgroup_size;  // which the pipeline has
+    const std::uint32_t size = device.info().subgroup_size;  // the pipeline has the same
     if (size < 4) {
         throw Error(device.info().name, "its subgroups have fewer than 4 lanes",
                     "training needs subgroup shuffles; choose another device with --device");

@@ -23,8 +23,8 @@ struct LossOptions {
     // around the image does), the gradient is 0 and L1 and squared error are left out of the sums;
     // means still divide by 3 H W.
     bool use_mask = false;
-    // Of strips: columns a thread and rows a strip; 0: what suits the device. The gradient does not
-    // depend on them, the sums do in their last bit.
+    // For strips: columns per thread and rows per strip; 0: what suits the device. The gradient
+    // does not depend on them, the sums do in their last bit.
     int columns = 0, rows = 0;
 };
 
@@ -39,8 +39,8 @@ struct LossBuffers {
 
 class Loss {
   public:
-    /// For images up to max_width x max_height px. Throws Error where it goes by strips and the
-    /// device's subgroups have fewer than 4 lanes.
+    /// For images up to max_width x max_height px. Throws Error where the loss goes by strips and
+    /// the device's subgroups have fewer than 4 lanes.
     Loss(Device& device, int max_width, int max_height, const LossOptions& options = {});
 
     /// Device memory of a Loss made with these arguments.
@@ -69,9 +69,9 @@ class Loss {
     LossWay way_;
     int lanes_ = 0, columns_ = 0, threads_ = 0;
     int wanted_works_ = 0;   // strips that keep the device busy
-    int rows_ = 0;           // of a strip, 0: by wanted_works_
-    Pipeline loss_;          // of strips
-    Pipeline maps_, slope_;  // of tiles
+    int rows_ = 0;           // rows of a strip; 0: by wanted_works_
+    Pipeline loss_;          // for strips
+    Pipeline maps_, slope_;  // for tiles
     Pipeline sum_;
     Buffer partial_;
     Buffer map_values_;  // [3][H][W][3] of tiles

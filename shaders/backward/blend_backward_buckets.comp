@@ -44,7 +44,7 @@ layout(set = 0, binding = 14, scalar) writeonly buffer PartialExponent { float p
 #include "lib/lockstep.glsl"
 #include "backward/splat_sums.glsl"
 
-const uint SLOT_BITS = 8u;  // of TILE_PIXELS
+const uint SLOT_BITS = 8u;  // enough for TILE_PIXELS
 shared uint pixel_word[TILE_PIXELS];  // slot, and above it how many of the bucket's intersections the pixel looks at
 shared float pixel_transmittance[TILE_PIXELS], pixel_behind[TILE_PIXELS];
 shared float pixel_d_red[TILE_PIXELS], pixel_d_green[TILE_PIXELS], pixel_d_blue[TILE_PIXELS];

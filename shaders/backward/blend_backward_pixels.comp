@@ -47,12 +47,12 @@ shared vec2 pair_depth[DEPTH_SUM == 1 ? TEAM * PAIRS : 2u];  // dL/d(depth) of b
 const uint OTHERS = RESTS + (SHAPED ? 1u : 0u);
 shared vec4 chunk_halves[TEAM * CHUNK * 2u];
 shared float chunk_others[TEAM * CHUNK * OTHERS];
-shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // of each intersection: its slot, its splat and blocks
+shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // per intersection: its slot; its splat and blocks
 shared uint area_end[TEAM];  // the list's intersections before it reach a pixel of the area
 uint chunk_begin;
 
 const uint PARTS = SUBGROUP_SIZE / SPLATS;                  // lanes that share a splat
-const uint ROWS_OF_PART = PARTS > 4u ? 1u : 4u / PARTS;     // of the four rows of pairs
+const uint ROWS_OF_PART = PARTS > 4u ? 1u : 4u / PARTS;     // how many of the four rows of pairs
 const uint COLUMNS_OF_PART = PARTS > 4u ? 4u : 8u;
 
 void put_colours(Pixels px) {
@@ -113,9 +113,9 @@ float over_parts(float v) {
     return v;
 }
 
-// Of a part of a row of pairs; i: from the part's middle.
+// Sums over a part of a row of pairs; i: from the part's middle.
 struct RowSums {
-    float both, both_i, both_ii, lower, lower_i;  // of both pixels' G, of the lower one's
+    float both, both_i, both_ii, lower, lower_i;  // sums of both pixels' G, and of the lower one's
 };
 
 void add_pair(inout RowSums s, inout Moments m, uint share, uint colour, float i) {
@@ -137,10 +137,10 @@ void add_pair(inout RowSums s, inout Moments m, uint share, uint colour, float i
     }
 }
 
-// Of the lane's splat of the batch over the block's pixels, the same in all lanes of a splat.
+// The sums of the lane's splat of the batch over the block's pixels, the same in all lanes of a splat.
 Moments sum_pixels() {
     const uint splat = gl_SubgroupInvocationID % SPLATS, part = gl_SubgroupInvocationID / SPLATS;
-    const bool halves = COLUMNS_OF_PART == 4u;  // of rows
+    const bool halves = COLUMNS_OF_PART == 4u;  // parts are half rows
     const uint first_pair = halves ? part * 4u : part * ROWS_OF_PART * 8u;
     const uint shares = (gl_SubgroupID * SPLATS + splat) * PAIR_STRIDE + first_pair;
     const uint colours = gl_SubgroupID * PAIRS + first_pair;
@@ -155,7 +155,7 @@ Moments sum_pixels() {
             s.both_i += middle * s.both;
             s.lower_i += middle * s.lower;
         }
-        const float j = first_j + float(row);  // of the upper pixels; of the lower ones j + 4
+        const float j = first_j + float(row);  // row of the upper pixels; that of the lower ones is j + 4
         m.g += s.both;
         m.gi += s.both_i;
         m.gii += s.both_ii;

@@ -24,7 +24,7 @@ const uint CHUNK = 32u;
 
 const uint TEAM = AREAS, SUMS = PARTIALS + RESTS + (SHAPED ? 1u : 0u);
 shared float chunk_sums[TEAM * CHUNK * SUMS];
-shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // of each intersection: its slot, its splat and blocks
+shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // per intersection: its slot; its splat and blocks
 shared uint area_end[TEAM];  // the list's intersections before it reach a pixel of the area
 uint chunk_begin;
 

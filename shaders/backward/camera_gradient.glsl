@@ -4,8 +4,8 @@
 
 layout(constant_id = 30) const int CAMERA_GRADIENT = 0;
 
-// Of one row of the Jacobian, (f/z, ., -f ratio/z), whose last entry is free of f, but not of c, where the ratio is
-// held at the picture's margin: dL/df and dL/dc. d: gradients of the row's first and last entry.
+// dL/df and dL/dc through one row of the Jacobian, (f/z, ., -f ratio/z). Where the ratio is held at the picture's
+// margin, the last entry depends on c, but not on f. d: gradients of the row's first and last entry.
 vec2 focal_gradient(vec2 d, float ratio, float free_ratio, float z, float d_pixel) {
     const bool held = ratio != free_ratio;
     return vec2(d_pixel * free_ratio + (d.x - (held ? 0.0 : d.y * ratio)) / z,

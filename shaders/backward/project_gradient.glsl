@@ -2,10 +2,10 @@
 // Source: docs/math.md, Gradients. Needs camera data, covariance.glsl, rest.glsl and the parameter buffers.
 
 struct SplatGradient {
-    vec3 position, log_scale;  // with LINEAR_VALUES of scale and, below, opacity
+    vec3 position, log_scale;  // with LINEAR_VALUES those of scale and, below, opacity
     vec4 rotation;
     float opacity_logit, shape;
-    vec3 colour;          // of the unclamped SH sum
+    vec3 colour;          // gradient of the unclamped SH sum
     vec3 direction;       // unit, camera to splat: the SH basis is evaluated there
     vec2 mean;            // px
 };
@@ -17,8 +17,8 @@ struct Partial {
     vec3 d_colour;
 };
 
-// The rows of N = L M, L the factor [[l11, l21], [0, l22]], M with the rows r1 and r2: (x, y) = L d, so a change
-// of M moves q by -2 (x, y) L dM N^T (x, y)^T. Entries are at most 1 whatever the splat's shape.
+// The rows of N = L M, L the factor [[l11, l21], [0, l22]], M with the rows r1 and r2: (x, y) = L d, so a
+// change of M moves q by -2 (x, y) L dM N^T (x, y)^T. Entries are at most 1 whatever the splat's shape.
 // l11 r1 + l21 r2 cancels on needles; the same by r2 x (r1 x r2) = |r2|^2 r1 - (r1 r2) r2 does not. l11 / c of the
 // shrunk rows is 1 / sqrt(c determinant).
 void whitened_rows(Factor f, vec3 r1, vec3 r2, out vec3 n1, out vec3 n2) {
@@ -69,7 +69,7 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     const vec3 raw_scale = log_scale[i];
     vec3 s = scale_of(raw_scale), share = vec3(1.0);
     const vec3 scale = s;
-    float kept = 1.0;  // of the opacity, by the filters
+    float kept = 1.0;  // share of the opacity that the filters keep
     if (SMOOTHING == 1) kept = smooth_scale(s, smoothing[i], share);
     float exponent = 0.0, by_shape = 0.0;
     if (SHAPED) exponent = shape_exponent(shape[i], by_shape);

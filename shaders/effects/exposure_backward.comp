@@ -1,5 +1,5 @@
-// The gradient of exposure.comp: d_image becomes that of the picture before the map, and every group leaves its sum
-// of the map's own gradient, the same in every run. What is covered counts for the map's offset, which the picture's
+// The gradient of exposure.comp: d_image becomes that of the picture before the map, and every group sums
+// the map's own gradient, the same in every run. What is covered counts for the map's offset, which the picture's
 // gradient does not tell: that goes to the plane dL/d(1 - transmittance). Place: between loss and blend_backward.
 // Work: groups of EXPOSURE_THREADS walk over the pixels in strides. Shared memory: 12 floats a thread, which a thread a
 // term adds up: as a tree, with a barrier for each level, the pass takes 3.5 times as long on a CPU. Reads the picture

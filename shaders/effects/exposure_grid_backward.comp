@@ -29,7 +29,7 @@ void main() {
     const vec4 colour = covered_colour(p);
     const vec3 d = vec3(d_image[p], d_image[args.pixels + p], d_image[2u * args.pixels + p]);
     const GridMap map = grid_map_at(grid_place(p, colour.rgb));
-    // Of the place by luminance.
+    // dL/d(level), the place along luminance.
     const float d_level = dot(d.x * map.slope[0] + d.y * map.slope[1] + d.z * map.slope[2], colour);
     const float luminance = dot(colour.rgb, LUMINANCE);
     const bool within = luminance > 0.0 && luminance < 1.0;

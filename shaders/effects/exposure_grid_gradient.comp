@@ -23,7 +23,7 @@ layout(set = 0, binding = 4, scalar) readonly buffer FinalT { float final_transm
 
 shared vec4 sums[EXPOSURE_GRID_THREADS][3 * EXPOSURE_GRID_L];  // rows of the maps
 
-// Of half the squared differences from the neighbours.
+// The gradient of half the squared differences from the neighbours, weighted.
 float roughness(uvec3 at, uint term) {
     const uvec3 last = uvec3(EXPOSURE_GRID_X - 1, EXPOSURE_GRID_Y - 1, EXPOSURE_GRID_L - 1);
     const uint row = term / 4u, column = term % 4u;

@@ -24,7 +24,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer Position { vec3 position[];
 layout(set = 0, binding = 2, scalar) writeonly buffer Smoothing { float smoothing[]; };
 
 const float FILTER_VARIANCE = 0.2;  // square pixels
-const float FRAME_MARGIN = 0.15;    // of width and height, on each side
+const float FRAME_MARGIN = 0.15;    // share of width and height, on each side
 
 void main() {
     const uint i = linear_id();

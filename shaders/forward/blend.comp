@@ -1,6 +1,6 @@
 // Blends each tile's splats front to back. alpha = min(0.99, opacity * w(q)); below the cut-off nothing; a pixel
-// ends before the splat that would bring its transmittance below 1e-4, less the slack of limits.h. Place: last pass
-// of the forward walk.
+// ends before the splat that would bring its transmittance below 1e-4, less the slack of limits.h. Place: last
+// pass of the forward walk.
 // Source: 3DGS section 4; kernels of DARB-Splatting.
 // Work: one workgroup a tile, one subgroup an area of it, PIXELS pixels a thread in registers. Each lane loads one
 // intersection of the tile's list; those whose ellipse touches the area are broadcast in turn. Shared memory: a

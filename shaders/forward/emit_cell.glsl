@@ -17,7 +17,7 @@ uint touched_blocks(EllipseRows e, uvec2 tile) {
 // bottom: lavapipe goes through the body of one that ends at its top once more, behind a mask.
 void emit_cells(TileCover c, uvec2 bits, uint splat, EllipseRows e, uint slot) {
     const uvec2 size = cell_size(c.extent);
-    uvec2 tile = uvec2(0), first = uvec2(0), last = uvec2(0);  // of the cell; none yet
+    uvec2 tile = uvec2(0), first = uvec2(0), last = uvec2(0);  // tiles of the cell; none yet
     do {
         if (tile.y == last.y) {
             const uint cell = bits.x != 0u ? uint(findLSB(bits.x)) : uint(findLSB(bits.y)) + 32u;

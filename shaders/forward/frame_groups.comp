@@ -16,7 +16,7 @@ layout(constant_id = 1) const int STAGE = 0;
 layout(push_constant, scalar) uniform Push { IntersectionArgs args; };
 layout(set = 0, binding = 0, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = 1, scalar) buffer Groups { FrameGroups groups; };
-layout(set = 0, binding = 2, scalar) readonly buffer Total { uint total; };  // of the scan
+layout(set = 0, binding = 2, scalar) readonly buffer Total { uint total; };  // total of the scan
 layout(set = 0, binding = 3, scalar) writeonly buffer InUse { uint in_use; };  // what later passes handle
 
 uvec2 split_groups(uint count) {

@@ -6,7 +6,7 @@ layout(constant_id = 162) const int BLEND_HALF_POWER = 0;
 layout(constant_id = 163) const int BLEND_SQUARED_VARIABLE = 0;
 layout(constant_id = 164) const float BLEND_SUPPORT = 3e38;
 layout(constant_id = 165) const float BLEND_INVERSE_SUPPORT = 0.0;
-layout(constant_id = 166) const float BLEND_CENTRE_RATIO = 1.0;  // of the line integrals through the centres, 2nd to 1st
+layout(constant_id = 166) const float BLEND_CENTRE_RATIO = 1.0;  // line integrals through the centres, 2nd to 1st
 layout(constant_id = 167) const float BLEND_FOURTH_1 = 1.0;      // moments in space; fourth: a third of it
 layout(constant_id = 168) const float BLEND_FOURTH_2 = 1.0;
 layout(constant_id = 169) const float BLEND_SECOND_1 = 1.0;

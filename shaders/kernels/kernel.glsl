@@ -21,9 +21,9 @@ layout(constant_id = 107) const float KERNEL_SUPPORT = 3e38;      // R^2
 layout(constant_id = 108) const float KERNEL_INVERSE_SUPPORT = 0.0;  // rounded up: u <= 0 at the edge
 layout(constant_id = 109) const float COVARIANCE_SCALE = 1.0;        // psi, or 1
 layout(constant_id = 110) const float ALPHA_CUTOFF = ALPHA_CUTOFF_DEFAULT;
-layout(constant_id = 111) const float KERNEL_REACH_MARGIN = 1e-5;  // relative, of w in kernel_reach
+layout(constant_id = 111) const float KERNEL_REACH_MARGIN = 1e-5;  // relative margin of w in kernel_reach
 layout(constant_id = 112) const int KERNEL_PULSES = 1;  // more: form RINGS, built-in only
-layout(constant_id = 120) const float KERNEL_C0 = 1.0;  // of P, rising powers; of RINGS: see its form
+layout(constant_id = 120) const float KERNEL_C0 = 1.0;  // coefficients of P, rising powers; for RINGS: see its form
 layout(constant_id = 121) const float KERNEL_C1 = 0.0;
 layout(constant_id = 122) const float KERNEL_C2 = 0.0;
 layout(constant_id = 123) const float KERNEL_C3 = 0.0;
@@ -49,7 +49,7 @@ KernelParameters first_kernel() {
 #include "kernels/gaussian.glsl"
 #include "kernels/quadric.glsl"
 
-// Of the forms that have no shape of each splat.
+// For the forms without a shape per splat.
 void form_value_slope(const KernelParameters k, float q, out float w, out float slope) {
     if (k.form == KERNEL_FORM_COMPACT)
         compact_value_slope(k, q, w, slope);
@@ -61,8 +61,8 @@ void form_value_slope(const KernelParameters k, float q, out float w, out float 
 
 #include "kernels/shaped.glsl"
 
-// Of a fixed kernel, or of a blend of two. Apart, so that a shader has few copies of all kernels: drivers inline
-// each call, and some only afterwards fold the constants.
+// For a fixed kernel, or a blend of two. A function of its own, so that a shader has few copies of all kernels: drivers
+// inline each call, and some fold the constants only afterwards.
 void fixed_value_slope(float q, float exponent, out float w, out float slope, inout float by_exponent) {
     if (EVALUATION == EVALUATION_BUILTIN && BLENDED == 0 && builtin_exists())
         builtin_value_slope(q, w, slope);

@@ -2,10 +2,10 @@
 // take it by value: a kernel and the second of a blend are two values, and what is left of either folds as constants do.
 struct KernelParameters {
     int form;               // KERNEL_FORM_*
-    int degree;             // of P
+    int degree;             // degree of P
     int half_power;         // 2a of u^a, 2e of (1+q)^-e
     int squared_variable;   // 1: x = t^2 rather than t = q/R^2
     float support;          // R^2
     float inverse_support;  // rounded up: u <= 0 at the edge
-    float c[KERNEL_MAX_DEGREE + 1];  // of P, rising powers; of RINGS: see its form
+    float c[KERNEL_MAX_DEGREE + 1];  // coefficients of P, rising powers; for RINGS: see its form
 };

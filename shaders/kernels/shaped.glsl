@@ -10,7 +10,7 @@ const bool SHAPED = BLENDED == 1 || KERNEL_FORM == KERNEL_FORM_BETA || KERNEL_FO
 #include "kernels/blend.glsl"
 #include "kernels/ges.glsl"
 
-// Of a kernel that is no blend. Also dw by the exponent, 0 on entry.
+// For a kernel that is no blend. Also gives dw by the exponent, which is 0 on entry.
 void shaped_value_slope(float q, float exponent, out float w, out float slope, inout float by_exponent) {
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL)
         exponential_value_slope(q, exponent, w, slope, by_exponent);

@@ -39,7 +39,7 @@ struct Factor {
     float l11, l21, l22;
     float a, c;         // the diagonal of S'
     float shrink;       // a power of two that brings the rows of M below 2 px; 1 up to ROW_LIMIT
-    float determinant;  // of S', times shrink^4
+    float determinant;  // determinant of S', times shrink^4
 };
 
 // 2^-k, 2^k the leading bit of the longest entry, where that is beyond ROW_LIMIT.
@@ -51,7 +51,7 @@ float row_shrink(vec3 r1, vec3 r2) {
                : 1.0;
 }
 
-float inverse_of_power(float power) {  // of two, exactly
+float inverse_of_power(float power) {  // exact for powers of two
     return uintBitsToFloat((254u << 23) - floatBitsToUint(power));
 }
 

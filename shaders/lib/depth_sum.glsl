@@ -5,9 +5,9 @@
 
 layout(constant_id = 32) const int DEPTH_SUM = 0;
 
-const uint DEPTH_PLANE = 3u;           // of the picture
-const uint DEPTH_GRADIENT_PLANE = 4u;  // of its gradient
-// Of an intersection's sums beside the partials: G dy dy, and dL/d(depth).
+const uint DEPTH_PLANE = 3u;           // plane of the picture
+const uint DEPTH_GRADIENT_PLANE = 4u;  // plane of its gradient
+// An intersection's sums beside the partials: G dy dy, and dL/d(depth).
 const uint RESTS = DEPTH_SUM == 1 ? 2u : 1u;
 
 #endif

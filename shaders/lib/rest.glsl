@@ -4,7 +4,7 @@
 #include "lib/rows.glsl"
 
 const int SH_USED = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
-const int FOURS = (SH_USED + 3) / 4;  // of coefficients, the last perhaps with one missing
+const int FOURS = (SH_USED + 3) / 4;  // groups of four coefficients; the last may lack one
 const uint COLUMNS = uint((SH_STORED + 1) * (SH_STORED + 1) + 2) / 4u * 3u;
 
 // Coefficients 4 t + 1 to 4 t + 4 of splat `row` of the range, rgb.

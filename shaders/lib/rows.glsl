@@ -2,7 +2,7 @@
 // ROW_BLOCK splats, in each a column of ROW_BLOCK vec4 after the other. So neighbouring threads read neighbouring words,
 // and a thread reads four floats at once. engine/raster/attribute_rows.h has the same for the host.
 
-// Of splat `row` of the bound range; columns: of a splat.
+// Where a column of splat `row` of the bound range lies; columns: how many a splat has.
 uint column_at(uint row, uint column, uint columns) {
     return (row / ROW_BLOCK * columns + column) * ROW_BLOCK + row % ROW_BLOCK;
 }

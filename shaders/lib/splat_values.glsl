@@ -1,6 +1,6 @@
 // What the floats of a splat stand for. As files and training have them: the logit of the opacity, logarithms of
-// scales, harmonics of a colour that is clamped at 0. LINEAR_VALUES: the opacity and the scales themselves, as calls
-// of renderers give them. DIRECT_COLOUR: sh_dc is the colour, of any sign, and there are no other harmonics.
+// scales, harmonics of a colour that is clamped at 0. LINEAR_VALUES: the opacity and the scales themselves, as
+// calls of renderers give them. DIRECT_COLOUR: sh_dc is the colour, of any sign, and there are no other harmonics.
 
 layout(constant_id = 210) const int LINEAR_VALUES = 0;
 layout(constant_id = 211) const int DIRECT_COLOUR = 0;

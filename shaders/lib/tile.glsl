@@ -1,7 +1,8 @@
 // The part of a splat's ellipse within a band of pixel rows, for the tiles of a splat and the blocks of a tile: a
 // rectangle is touched where its rows' part of the ellipse reaches its columns.
 
-// Of one splat: q <= reach, with slack for rounding: what a pass skips must be below the alpha cut-off for certain.
+// The ellipse of one splat, q <= reach, with slack for rounding: what a pass skips must be below the alpha cut-off for
+// certain.
 struct EllipseRows {
     vec2 mean;             // px
     float l21, l22, width; // width: 1 / l11

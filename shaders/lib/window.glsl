@@ -5,9 +5,9 @@
 #include "lib/depth.glsl"
 
 const uint WINDOW = DEPTH_ORDER == DEPTH_ORDER_PIXEL ? DEPTH_WINDOW : 1u;
-const float NO_DEPTH = -3e38;  // of an empty place, which comes out first and has no alpha
+const float NO_DEPTH = -3e38;  // depth of an empty place, which comes out first and has no alpha
 
-// Of the thread, [WINDOW][PIXELS]; not parameters, which some compilers copy at every call.
+// The thread's own, [WINDOW][PIXELS]; not parameters, which some compilers copy at every call.
 float window_depth[WINDOW * PIXELS];
 vec4 window_light[WINDOW * PIXELS];  // colour, alpha
 

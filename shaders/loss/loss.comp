@@ -35,7 +35,7 @@ struct Strip {
     int channel;
     int first, last;  // rows [first, last) are this strip's
     int left;         // column of this lane's slot 0
-    int slot;         // of this lane's slot 0 in the strip
+    int slot;         // where this lane's slot 0 lies in the strip
 };
 
 Strip strip_of(uint work, int lane) {

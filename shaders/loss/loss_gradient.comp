@@ -32,7 +32,7 @@ float blur_across(int map, int x, int y) {
                 d[map][at - 3] + d[map][at + 3], d[map][at - 4] + d[map][at + 4], d[map][at - 5] + d[map][at + 5]);
 }
 
-// Of column x over the 11 rows from row y on.
+// The blur of column x over the 11 rows from row y on.
 float blur_down(int map, int x, int y) {
     const float taps[11] = float[](TAP5, TAP4, TAP3, TAP2, TAP1, TAP0, TAP1, TAP2, TAP3, TAP4, TAP5);
     float sum = TAP5 * across[map][y * LOSS_TILE + x];

@@ -16,7 +16,7 @@ float adam_step(float parameter, inout vec2 moment, float gradient, float rate) 
            rate * moment.x / (sqrt(moment.y) * args.inverse_sqrt_correction2 + ADAM_EPSILON);
 }
 
-// Of several parameters at once, whose moments are as many pairs.
+// The steps of several parameters at once, whose moments are as many pairs.
 struct Moments3 { vec4 first; vec2 last; };
 vec3 adam_step(vec3 parameter, inout Moments3 moments, vec3 gradient, float rate) {
     parameter.x = adam_step(parameter.x, moments.first.xy, gradient.x, rate);

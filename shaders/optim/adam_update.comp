@@ -14,12 +14,12 @@
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
-layout(constant_id = 1) const uint FLOATS = 1;  // of a splat
+layout(constant_id = 1) const uint FLOATS = 1;  // floats per splat
 layout(constant_id = 2) const int STEP = STEP_PLAIN;
 layout(constant_id = 3) const int REST = REST_EACH;
 
 layout(push_constant, scalar) uniform Push { AdamUpdateArgs args; };
-layout(set = 0, binding = 0, scalar) buffer Value { float value[]; };  // of the range, as the next two and rest_sum
+layout(set = 0, binding = 0, scalar) buffer Value { float value[]; };  // only the range's, like the next two and rest_sum
 layout(set = 0, binding = 1, scalar) buffer Moment { vec2 moment[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Gradient { float gradient[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Views { vec2 views[]; };  // [N] sum of norms, views

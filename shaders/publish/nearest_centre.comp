@@ -1,5 +1,5 @@
-// The centre nearest to each row of numbers: the step of k-means that costs. Squared distances less what all centres
-// of a row share, |c|^2 - 2 x c; the first of equal ones wins.
+// The centre nearest to each row of numbers: the step of k-means that costs. Squared distances less what all
+// centres of a row share, |c|^2 - 2 x c; the first of equal ones wins.
 // Place: SOG's palette of harmonics, engine/publish. Work: a workgroup takes up to ROWS times THREADS rows of one batch, a
 // thread ROWS of them, which it keeps in registers: on lavapipe a load within a loop costs as much as many products.
 // Shared memory: none. Reads groups, rows, centres; writes labels.
@@ -11,8 +11,8 @@
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
-layout(constant_id = 1) const uint QUADS = 12;  // of a row, padded with zeros to whole quads
-layout(constant_id = 2) const uint ROWS = 1;    // of a thread
+layout(constant_id = 1) const uint QUADS = 12;  // quads per row, padded with zeros to whole ones
+layout(constant_id = 2) const uint ROWS = 1;    // rows per thread
 
 layout(push_constant, scalar) uniform Push { NearestCentreArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Groups { ClusterGroup groups[]; };

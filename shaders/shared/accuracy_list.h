@@ -14,7 +14,7 @@
 #define DEPTH_ORDER_CENTRE16 1
 #define DEPTH_ORDER_PIXEL 2
 
-#define DEPTH_KEY_BITS 16  // of centre16
+#define DEPTH_KEY_BITS 16  // for centre16
 #define DEPTH_KEY_SHIFT \
     11  // float bits left out: 4,096 keys an octave, 16 octaves from the near plane
 #define DEPTH_WINDOW 4u  // splats that a pixel holds back to sort

@@ -4,8 +4,8 @@
 
 #include "types.h"
 
-#define EXPOSURE_THREADS 64      // of a group of exposure_backward
-#define EXPOSURE_MAX_GROUPS 128  // of exposure_backward: partial sums that the update adds
+#define EXPOSURE_THREADS 64      // threads of a group of exposure_backward
+#define EXPOSURE_MAX_GROUPS 128  // most groups of it: partial sums that the update adds
 #define EXPOSURE_TERMS 12        // a 3 x 4 map of colours, row-major
 
 // A bilateral grid of maps: vertices across the picture, down, and by luminance.
@@ -13,8 +13,8 @@
 #define EXPOSURE_GRID_Y 8
 #define EXPOSURE_GRID_L 4
 #define EXPOSURE_GRID_VERTICES 256
-#define EXPOSURE_GRID_THREADS 32        // of a group of exposure_grid_gradient
-#define EXPOSURE_GRID_SMOOTHNESS 0.001  // of the loss: half the squared differences of neighbours
+#define EXPOSURE_GRID_THREADS 32        // threads of a group of exposure_grid_gradient
+#define EXPOSURE_GRID_SMOOTHNESS 0.001  // weight of half the squared differences of neighbours
 
 #ifdef __cplusplus
 namespace darb::gpu {
@@ -22,17 +22,17 @@ namespace darb::gpu {
 
 struct ExposureArgs {
     uint pixels;  // H W
-    uint view;    // whose map
-    uint groups;  // of exposure_backward
+    uint view;    // view whose map it is
+    uint groups;  // groups of exposure_backward
     float background_r, background_g, background_b;
-    uint width;  // of the picture
+    uint width;  // width of the picture, px
 };
 
 struct ExposureUpdateArgs {
     uint view;
-    uint views;   // that share the mean
+    uint views;   // views that share the mean
     uint groups;  // partial sums of each term
-    uint terms;   // of a view: one map's, or those of a grid
+    uint terms;   // terms per view: those of one map or of a grid
     float rate;   // lr / (1 - beta1^t), t the visits of this view
     float inverse_sqrt_correction2;
 };

@@ -12,7 +12,7 @@ namespace darb::gpu {
 
 struct KernelProbeArgs {
     uint count;      // entries
-    float exponent;  // of a kernel with shapes
+    float exponent;  // for a kernel with shapes
 };
 
 #ifdef __cplusplus

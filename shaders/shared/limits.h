@@ -1,5 +1,5 @@
-// Limits at which parameters are clamped where they are read, and splats are rejected. The gradient
-// of a clamped parameter is zero outside. Shared by C++ (engine/reference) and GLSL.
+// Limits at which parameters are clamped where they are read, and splats are rejected. A clamped
+// parameter has a gradient of zero outside. Shared by C++ (engine/reference) and GLSL.
 #ifndef DARB_LIMITS_H
 #define DARB_LIMITS_H
 

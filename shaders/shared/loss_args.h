@@ -7,7 +7,7 @@
 #define LOSS_HALO 10  // px on each side that a strip reads: 5 of the window, forward and backward
 #define LOSS_TILE 16  // px, the side of a tile
 #define LOSS_SIDE 26  // px, of what a tile reads: 5 more on each side
-#define LOSS_SUM_THREADS 64  // of the one workgroup that adds the partial sums
+#define LOSS_SUM_THREADS 64  // threads of the one workgroup that adds the partial sums
 
 #ifdef __cplusplus
 namespace darb::gpu {
@@ -27,7 +27,7 @@ struct LossArgs {
 struct DepthLossArgs {
     uint pixels;    // H W
     uint measured;  // 1: the photo has depths behind its colours
-    float scale;    // of the absolute difference: weight / (H W times the usual depth)
+    float scale;    // factor of the absolute difference: weight / (H W times the usual depth)
 };
 
 struct LossSumArgs {

@@ -1,5 +1,5 @@
-// Arguments of the projection backward with its fused Adam step, of density control and of the mean
-// of iterates.
+// Arguments of the projection backward with its fused Adam step, of density control, and of the
+// iterates' mean.
 #ifndef DARB_OPTIM_ARGS_H
 #define DARB_OPTIM_ARGS_H
 
@@ -11,11 +11,11 @@ namespace darb::gpu {
 #endif
 
 struct ProjectBackwardArgs {
-    uint first_splat;  // of this dispatch; harmonics and their moments are bound from it on
+    uint first_splat;  // first of this dispatch; harmonics and their moments are bound from it on
     uint splat_end;    // one past its last
     uint camera_index;
     float low_pass;  // px^2
-    // What follows is read with UPDATE_ADAM. Each rate is lr / (1 - beta1^t), of ATTRIBUTE_*; the
+    // What follows is read with UPDATE_ADAM. Each rate is lr / (1 - beta1^t), by ATTRIBUTE_*; the
     // second moment's correction is common.
     float rate[ATTRIBUTES];
     float inverse_sqrt_correction2;  // 1 / sqrt(1 - beta2^t)
@@ -25,11 +25,11 @@ struct ProjectBackwardArgs {
     uint regularise_unseen;
     float largest_log_scale;  // no scale grows beyond it
     float clearance;          // world: splats nearer to the camera fade
-    float rest_share;         // of an iteration's gradient in the mean that a step is made of
+    float rest_share;         // weight of an iteration's gradient in the mean that a step uses
 };
 
-// What project_backward does with the gradients of a splat: the Adam step; into the buffers of
-// gradients; added to what they hold.
+// What project_backward does with a splat's gradients: take the Adam step, store them in the
+// buffers of gradients, or add them to what these hold.
 #define UPDATE_ADAM 0
 #define UPDATE_STORE 1
 #define UPDATE_ADD 2
@@ -37,12 +37,12 @@ struct ProjectBackwardArgs {
 // One attribute's step of adam_update, over the splats of a range.
 struct AdamUpdateArgs {
     uint first_splat, splat_count;
-    uint floats_in_use;                  // of a splat; the others are left alone
+    uint floats_in_use;                  // floats per splat to update; the others are left alone
     float rate;                          // as above
     float inverse_sqrt_correction2;      // as above
     float beta1, share1, beta2, share2;  // share = 1 - beta
-    float gradient_scale;                // of what the buffers of gradients hold
-    float weight;                        // of the attribute's regulariser, in each view's loss
+    float gradient_scale;                // scales what the buffers of gradients hold
+    float weight;             // weight of the attribute's regulariser in each view's loss
     float regularise_unseen;  // share of the views whose regularisers act on what they do not show
     float largest;            // STEP_SCALE: no value grows beyond it
     float rest_share;         // STEP_REST: as above
@@ -90,7 +90,7 @@ struct DensifyArgs {
     float clone_split_scale;   // world: largest standard deviation below clones, above splits
     float prune_opacity;       // below it a splat goes
     float prune_scale;         // world: above it a splat goes; <= 0: off
-    uint seed;                 // of the split offsets, differs at each call
+    uint seed;                 // for the split offsets; differs at each call
 };
 
 // One range of the splats after, from one range of the splats before: each is bound from its first
@@ -104,7 +104,7 @@ struct GatherArgs {
 
 struct AverageArgs {
     uint count;   // floats
-    float share;  // of the value in the mean
+    float share;  // weight of the new value in the mean
 };
 
 struct ResetOpacityArgs {

@@ -6,7 +6,7 @@
 
 #define RADIX_MAX_DIGITS 256  // 8 bits a pass
 #define RADIX_MAX_PASSES 4
-#define RADIX_THREADS 64  // of the pass that prepares
+#define RADIX_THREADS 64  // threads of the pass that prepares
 
 #ifdef __cplusplus
 namespace darb::gpu {
@@ -27,9 +27,9 @@ struct RadixPlan {
 };
 
 struct RadixPassArgs {
-    uint shift;   // of this pass's digit
+    uint shift;   // first bit of this pass's digit
     uint digits;  // values of the digit, a power of two up to RADIX_MAX_DIGITS
-    uint first;   // of the pass's totals: RADIX_MAX_DIGITS * its number
+    uint first;   // where the pass's totals begin: RADIX_MAX_DIGITS * its number
 };
 
 #ifdef __cplusplus

@@ -89,8 +89,8 @@ struct FrameStatus {
     uint overflow;       // OVERFLOW_*: the frame is to be repeated; sticky until the host clears it
     uint bad_gradients;  // splats whose gradient was not finite
     uint culled[CULL_REASONS];
-    uint longest_list;  // intersections of the tile that has most
-    uint huge_splats;   // of more than HUGE_INTERSECTIONS intersections
+    uint longest_list;  // intersections of the tile that has the most
+    uint huge_splats;   // splats of more than HUGE_INTERSECTIONS intersections
 };
 
 // VkDispatchIndirectCommand of the passes over V and over K.
@@ -100,7 +100,7 @@ struct FrameGroups {
 };
 
 struct ProjectArgs {
-    uint first_splat;  // of this dispatch, whose harmonics are bound from there on
+    uint first_splat;  // first splat of this dispatch; harmonics are bound from it on
     uint splat_end;    // one past its last
     uint camera_index;
     float low_pass;  // px^2, added to the diagonal of the projected covariance
@@ -127,7 +127,7 @@ struct BlendArgs {
     uint height;  // px
     uint tiles_x;
     float background_r, background_g, background_b;
-    uint segment;   // of every list that this dispatch works off, where SEGMENT > 0
+    uint segment;   // which segment of every list this dispatch takes, where SEGMENT > 0
     uint segments;  // in all
 };
 
@@ -135,7 +135,7 @@ struct BucketArgs {
     uint width;   // px
     uint height;  // px
     uint tiles_x;
-    uint records;  // that the buffers hold
+    uint records;  // records that the buffers hold
 };
 
 struct UpsampleArgs {

@@ -5,12 +5,12 @@
 #include "types.h"
 
 #define STEREO_SOURCES 8            // photos that one is compared with, at most
-#define STEREO_RADIUS 3             // px, of the window
-#define STEREO_SAMPLES 25           // every other pixel of it, as on a chess board
-#define STEREO_GREY_SPREAD 0.15     // of the weights, in greys
-#define STEREO_PLACE_SPREAD 3.0     // of the weights, px
-#define STEREO_LEAST_VARIANCE 4e-5  // of greys; below it a window shows nothing
-#define STEREO_NO_COST 2.0          // of a plane that too few photos show
+#define STEREO_RADIUS 3             // half the side of the window, px
+#define STEREO_SAMPLES 25           // every other pixel of the window, as on a chess board
+#define STEREO_GREY_SPREAD 0.15     // spread of the weights over greys
+#define STEREO_PLACE_SPREAD 3.0     // spread of the weights over distance, px
+#define STEREO_LEAST_VARIANCE 4e-5  // variance of greys below which a window shows nothing
+#define STEREO_NO_COST 2.0          // cost of a plane that too few photos show
 
 #ifdef __cplusplus
 namespace darb::gpu {
@@ -25,13 +25,13 @@ struct StereoSource {
 };
 
 struct StereoArgs {
-    uint width, height;  // px, of the reference, whose greys are the first
+    uint width, height;  // size of the reference, px; its greys come first
     uint sources;
     uint seed;
     float farthest, nearest;  // inverse depths, farthest < nearest
     float steepest;           // |slope| over inverse depth, at most; 1 / px
-    uint colour;              // of the chess board, 0 or 1: these pixels change
-    float reach;              // of the random changes, as a share of the whole range
+    uint colour;              // colour on the chess board, 0 or 1: its pixels change
+    float reach;              // largest random change, as a share of the whole range
 };
 
 #ifdef __cplusplus

@@ -14,11 +14,11 @@ namespace darb::gpu {
 struct RelocationArgs {
     uint splat_count;    // N before
     uint splats_after;   // N after: draws go to the dead, then behind the last
-    uint dead_count;     // of the N before
-    uint weight_total;   // of the live
+    uint dead_count;     // how many of the N before are dead
+    uint weight_total;   // sum of the weights of the live
     float dead_opacity;  // below it a splat is dead
     float weight_scale;  // integer weight of opacity 1; the sum of all stays below 2^32
-    uint seed;           // of the draws, differs at each call
+    uint seed;           // for the draws; differs at each call
 };
 
 struct NoiseArgs {

@@ -40,7 +40,7 @@ struct PaneArgs {
     uint width, height;  // px of the frame
     uint left, right;    // px, columns that are written
     uint difference;     // 1: the difference to the other picture, as heat
-    float heat_max;      // that gets the hottest colour
+    float heat_max;      // value that gets the hottest colour
 };
 
 #ifdef __cplusplus

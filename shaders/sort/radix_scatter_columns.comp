@@ -1,7 +1,7 @@
 // Radix sort, step 3 of 3 of a pass, for lavapipe: every thread walks ITEMS contiguous keys with a
 // private column of counters, so that neither ranking nor order needs other threads.
-// One workgroup, which is one subgroup, a block of THREADS * ITEMS keys. The columns are an array
-// of registers: on lavapipe these are half as dear as shared memory, and rows of them are vectors.
+// One workgroup, which is one subgroup, a block of THREADS * ITEMS keys. The columns are an
+// array of registers: on lavapipe these are half as dear as shared memory, and rows of them are vectors.
 // Reads offsets [digits][blocks], keys and values [n]; writes keys and values [n].
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -7,7 +7,7 @@
 
 struct StereoWindow {
     float grey[STEREO_SAMPLES], weight[STEREO_SAMPLES];
-    float total;  // of the weights
+    float total;  // sum of the weights
     vec2 at;      // px
 };
 

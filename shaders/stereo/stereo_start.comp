@@ -1,5 +1,5 @@
-// A first plane for each pixel: the best of several that face the camera, at inverse depths drawn from as many parts
-// of the range. Place: once a photo, before the sweeps. Work: one thread a pixel. Shared memory: none.
+// A first plane for each pixel: the best of several that face the camera, at inverse depths drawn from as many
+// parts of the range. Place: once a photo, before the sweeps. Work: one thread a pixel. Shared memory: none.
 // Reads greys, sources; writes planes.
 #version 460
 #extension GL_GOOGLE_include_directive : require

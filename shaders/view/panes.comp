@@ -18,7 +18,7 @@ layout(set = 0, binding = 2, scalar) writeonly buffer Pixels { uint pixels[]; };
 #include "lib/linear_id.glsl"
 #include "view/heat.glsl"
 
-// Of a picture's light, where a photo or an error is asked for and there is none: it ought not to be taken for one.
+// Share of a picture's light shown where there is no photo or error to show: it must not be taken for one.
 const float BESIDE = 0.35;
 
 void main() {

@@ -48,19 +48,21 @@ namespace darb {
 /// A run's failure, unless it was interrupted, and its notes, for people; -q hides the notes.
 void say_what_went_wrong(const ComparedRun& run);
 
-/// Of one data set.
+/// Measures the runs on one data set.
 class RunMeasurer {
   public:
-    /// path: of the data set. Throws Error where a photo is too small for one of flags.scales.
-    /// lpips may be null.
+    /// path: the data set's. Throws Error where a photo is too small for one of flags.scales. lpips
+    /// may be null.
     RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
                 const Dataset& dataset, const TrainRequest& first, const Lpips* lpips);
 
-    // Of runs that came to their end. What fails here becomes a note and leaves the run as it is.
+    // These take runs that came to their end. What fails here becomes a note and leaves the run as
+    // it is.
 
-    /// All but blending.
+    /// Measures all but blending.
     void measure(ComparedRun& run);
-    /// Of each kernel's first run that came to its end: on one device, as times are compared.
+    /// Measures each kernel's first run that came to its end: all on one device, as times are
+    /// compared.
     void measure_blending(std::vector<ComparedRun>& runs, const std::vector<View>& held_out) const;
     /// What is measured, in words: ranks that differ in it would give numbers to some runs alone.
     std::string measurements() const;
@@ -289,7 +291,7 @@ class Comparer {
     std::string fingerprint() const { return dataset_fingerprint(dataset_, photos_); }
     RunMeasurer& measurer() { return *measurer_; }
     std::vector<View> held_out() const { return held_out_views(dataset_.views); }
-    /// Of all runs, by seed and then kernel, those of this rank; up to the stop.
+    /// This rank's share of all runs, by seed and then kernel, up to the stop.
     std::vector<ComparedRun> runs(const std::vector<int>& kernels, const Ranks& ranks,
                                   const std::atomic<bool>& stop);
 
@@ -319,7 +321,7 @@ void Comparer::train(TrainJob& job, const std::atomic<bool>& stop) {
     say_note(title);
     const RunLock lock(request.output);
     Device device(
-        command_device(flags_.device));  // of its own, so that the peak of memory is this run's
+        command_device(flags_.device));  // its own, so that the peak of memory is this run's
     settle_tuning(device);
     find_start(device, job, say_stereo_begins);
     darb::run(device, job, {.quiet = flags_.quiet, .stop = &stop});

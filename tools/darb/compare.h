@@ -65,7 +65,7 @@ void check_same_runs(Ranks& ranks, const CompareFlags& flags, const std::string&
                      const std::vector<int>& kernels, const std::string& fingerprint,
                      const std::string& measurements);
 
-/// Of --lpips; note: which, or why none.
+/// The metric for --lpips; note: which one it is, or why there is none.
 std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note);
 
 /// Trains what is not there yet and reads and measures everything, one data set; ends early, with

@@ -61,7 +61,7 @@ SplatModel join_scenes(std::vector<SplatModel> scenes,
 class PaletteDevice {
   public:
     explicit PaletteDevice(std::string select) : select_(std::move(select)) {}
-    /// For EncodeOptions; this has to outlive it.
+    /// For EncodeOptions, which this object must outlive.
     AssignRows assign_rows();
 
   private:
@@ -100,7 +100,7 @@ struct WrittenScene {
     EncodedSplats encoded;
     PictureFit fit;
     std::size_t splats = 0;
-    int levels = 1;  // that fit.level was chosen from
+    int levels = 1;  // levels that fit.level was chosen from
 };
 
 class SceneOutput : public PictureOutput {
@@ -154,7 +154,7 @@ Device* PictureDevice::get() {
 /// What every scene that a command writes has in common.
 struct SceneWriter {
     SplatFormat format;
-    const std::vector<View>& views;  // of a measure
+    const std::vector<View>& views;  // views to measure on
     PictureDevice& device;
     const WrittenFiles& files;
     const Paths& inputs;
@@ -387,7 +387,7 @@ int convert_to_scene(SplatModel& model, SplatFormat format, const ConvertFlags& 
 int convert(ConvertFlags flags) {
     sort_names(flags);
     check_level_options(flags.levels);
-    Paths sources;  // that decide whose an output is
+    Paths sources;  // files that decide whose an output is
     for (const std::filesystem::path& file : flags.files) sources.push_back(file);
     Paths inputs = together({files_of(flags.cameras), files_of(flags.levels.refine)});
     for (const std::filesystem::path& file : flags.files)

@@ -34,9 +34,9 @@ struct CostFlags {
     bool quick = false, full = false, quiet = false, white_background = false;
     DatasetOptions data;
     TuneFlags tune;
-    KernelFlags kernel;  // in the place of the scene's
+    KernelFlags kernel;  // in place of the scene's
     std::string size = "640x480";
-    StoredUnits units;  // of the scene
+    StoredUnits units;  // how the scene's file stores its values
 };
 
 /// darb cost --train DATASET

@@ -55,9 +55,9 @@ nlohmann::json told_light(std::FILE* out, const LightReport& light);
 
 // The cameras that a run ended with, where it refined them.
 
-/// Of views of the same name, at these views' sizes, from the cameras.json of the scene's run; a
-/// note says so. Nothing happens where the run refined none. Throws Error where the file is not
-/// what a run leaves.
+/// Takes the cameras of the same names from the cameras.json of the scene's run, at these views'
+/// sizes, and says so in a note. Does nothing where the run refined none. Throws Error where the
+/// file is not what a run leaves.
 void take_trained_cameras(const std::filesystem::path& scene, std::vector<View>& views);
 
 namespace {

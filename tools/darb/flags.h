@@ -21,7 +21,7 @@ struct AccuracyFlags {
     std::array<std::string, kAccuracyCount> choice;  // empty: the preset's
 };
 
-/// Of pictures; of training they are rows of trainer/job/request_options.h.
+/// For pictures; for training they are rows of trainer/job/request_options.h.
 void add_accuracy_flags(CLI::App& command, AccuracyFlags& flags);
 
 /// The preset with what single flags change. Throws Error on names that do not exist.

@@ -23,10 +23,11 @@ std::shared_ptr<CLI::Formatter> make_help_formatter();
 /// The candidate nearest to a word that is none of them, or "" where none is near.
 std::string nearest_name(const std::string& word, const std::vector<std::string>& candidates);
 
-/// With the nearest command that there is.
+/// The error for an unknown command; it names the nearest one that there is.
 Error unknown_command(const CLI::App& app, const std::string& word);
 
-/// What the parser found, with the option, the reason and a remedy; of an unknown one the nearest.
+/// What the parser found, with the option, the reason and a remedy; for an unknown option the
+/// nearest one.
 Error usage_error(const CLI::App& app, const CLI::ParseError& error);
 
 // Every command and option, for man pages and for the completion of shells.

@@ -168,10 +168,10 @@ struct Refinement {
     const LevelFlags& flags;
     Refiner refiner;
     Device device;
-    double photos_db = 0;  // of the model
+    double photos_db = 0;  // PSNR of the whole model on the held-out photos
 };
 
-/// All levels as one scene; rows: of the model and the levels.
+/// All levels as one scene; rows: one for the model and one for each level.
 void write_streamed(const SplatModel& model, std::vector<SplatModel> levels, const LevelOutput& to,
                     std::vector<Row>& rows) {
     SplatModel finest = model;
@@ -265,7 +265,7 @@ SceneDifference compare_scenes(const SplatModel& scene, const SplatModel& other,
 
 namespace {
 
-// Of 3DGS where it ends: the splats are where they belong, and only settle.
+// The rates at which 3DGS ends: the splats are where they belong, and only settle.
 constexpr float kPositionRate = 1.6e-5f, kLastPositionRate = 1.6e-6f;
 
 TrainRequest refine_request(const SplatModel& model, int iterations) {

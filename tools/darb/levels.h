@@ -18,8 +18,8 @@
 namespace darb {
 
 struct LevelFlags {
-    std::size_t splats = 0;       // of the first level; 0: by share
-    std::optional<double> share;  // of each level of the one before
+    std::size_t splats = 0;       // splats of the first level; 0: by share
+    std::optional<double> share;  // share of each level in the one before
     int levels = 0;               // 0: one file of the output's name
     std::filesystem::path refine;
     int iterations = 300;

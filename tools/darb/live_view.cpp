@@ -56,8 +56,8 @@ struct LiveView::State {
     const std::atomic<bool>& lost;
     bool white;
     LivePicture picture;
-    LiveDrawer drawer;  // of the run's thread
-    LiveCurves curves;  // of the run's thread
+    LiveDrawer drawer;  // used by the run's thread
+    LiveCurves curves;  // used by the run's thread
 
     std::mutex mutex;
     std::condition_variable changed;
@@ -65,12 +65,12 @@ struct LiveView::State {
     TrainingCurves training;  // as the run reports it; pause and steps as the user wants them
     std::optional<LiveScene> scene;
     std::filesystem::path model;
-    int version = 0;  // of `training`
+    int version = 0;  // version of `training`
     bool closed = false, finished = false;
     std::atomic<bool> leave{false};  // the run failed
     std::string failure;             // why the window closed by itself
 
-    int followed = 0;  // of the window's thread: the version that it shows
+    int followed = 0;  // the version that the window's thread shows
     std::chrono::steady_clock::time_point redrawn;
     bool begun = false, ended = false;
     std::thread thread;  // the last member: it uses all others
@@ -87,7 +87,7 @@ constexpr auto kPausedNap = std::chrono::milliseconds(20);
 struct LiveSystem::System {
     std::atomic<bool> lost{false};  // the display; before what it outlives
     WindowSystem windows;
-    DeviceOptions device;  // of windows
+    DeviceOptions device;  // options that windows need
 };
 
 LiveView::LiveView(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -197,7 +197,7 @@ namespace {
 
 constexpr size_t kLongestCurve = 1000;
 constexpr std::size_t kPointsLookedAt = 20'000;
-constexpr float kSmoothing = 0.05f;  // of loss and PSNR, which jump from photo to photo
+constexpr float kSmoothing = 0.05f;  // for loss and PSNR, which jump from photo to photo
 
 void thin(std::vector<float>& values) {
     for (size_t i = 0; 2 * i < values.size(); ++i) values[i] = values[2 * i];
@@ -244,7 +244,7 @@ void LiveCurves::add(const LiveStep& step, TrainingCurves& t) {
 
 namespace {
 
-constexpr double kNap_s = 0.05;    // of the window, between two looks at the run
+constexpr double kNap_s = 0.05;    // pause of the window between two looks at the run
 constexpr double kRedraw_s = 0.2;  // between two redraws for the curves alone
 
 }  // namespace

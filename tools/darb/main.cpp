@@ -102,7 +102,8 @@ int run(int argc, char** argv) {
     return action();
 }
 
-// Of what is printed, where the file behind stdout fails; else of a thread that did not start.
+// The error is of the output where the file behind stdout failed, else of a thread that did not
+// start.
 int report(const std::system_error& e) {
     const bool output = std::ferror(stdout) != 0;
     darb::say("error: {}: {}\n  {}\n", output ? "standard output" : "darb", e.code().message(),

@@ -26,7 +26,7 @@ namespace {
 
 using Identity = std::pair<dev_t, ino_t>;
 
-// Of a regular file that is there.
+// Whether `path` is a regular file that is there; `identity` then becomes the file's.
 bool identify(const fs::path& path, Identity& identity) {
     struct stat facts {};
     if (::stat(path.c_str(), &facts) != 0 || !S_ISREG(facts.st_mode)) return false;
@@ -107,7 +107,7 @@ Paths files_of(const fs::path& input) {
         for (const fs::directory_entry& entry : fs::directory_iterator(beside, none)) {
             if (has_extension(entry.path(), ".webp")) files.push_back(entry.path());
             for (const fs::directory_entry& part : fs::directory_iterator(entry.path(), none))
-                files.push_back(part.path());  // of a streamed scene
+                files.push_back(part.path());  // part of a streamed scene
         }
     if (has_extension(input, ".gltf"))
         for (const fs::directory_entry& entry :

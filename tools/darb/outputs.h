@@ -40,7 +40,7 @@ enum class Replaces {
 /// or not, where two outputs are one file, or where one is there that is not replaced. Empty paths
 /// and "-" do not count. Pipes and devices may be named twice.
 void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs, Replaces replaces);
-void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs);  // of reports
+void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs);  // for reports
 
 /// Which files darb may write over without being told: those that it wrote itself, from the same
 /// scene. A record in the user's state folder says so; docs/formats.md has the rule.

@@ -40,11 +40,12 @@ namespace darb {
 AntialiasProbe probe_antialias(const DeviceOptions& device, const Dataset& dataset,
                                const TrainOptions& options, const EffectPlan& plan);
 
-/// Of options.kernel, whose shape each splat learns, beside the Gaussian; both as the plan has it.
+/// Tries options.kernel, whose shape each splat learns, beside the Gaussian; both as the plan has
+/// it.
 Trial try_shape(const DeviceOptions& device, const Dataset& dataset, const TrainOptions& options,
                 const EffectPlan& plan);
-/// Of --exposure-grid beside one map a photo, where the plan has exposure. Pictures are fitted to
-/// the held-out photos' exposure before they are measured.
+/// Tries --exposure-grid beside one map a photo, where the plan has exposure. Pictures are fitted
+/// to the held-out photos' exposure before they are measured.
 Trial try_exposure_grid(const DeviceOptions& device, const Dataset& dataset,
                         const TrainOptions& options, const EffectPlan& plan);
 
@@ -76,14 +77,14 @@ namespace {
 using nlohmann::json;
 
 struct PlanFlags {
-    PlanRequest plan;  // but for its kernel, which is words at first
+    PlanRequest plan;  // except for its kernel, which is words at first
     std::filesystem::path json;
     bool quiet = false, no_price = false, compare = false, probe = false;
     int probe_iterations = 400;
     KernelFlags kernel;
 };
 
-// Of a data set alone; open_subject() looks at the others.
+// Refuses flags that only a data set takes; open_subject() looks at the others.
 void refuse_for_scenes(const PlanFlags& flags) {
     const auto refuse = [&](bool given, const char* flag) {
         if (given)
@@ -102,7 +103,7 @@ TrainOptions probed_options(const PlanFlags& flags) {
     return train;
 }
 
-// Of shapes where the kernel to train with has some, of grids where exposure is on.
+// Tries shapes where the kernel to train with has some, and grids where exposure is on.
 std::vector<Trial> try_on_subject(const PlanSubject& s, const PlanFlags& flags,
                                   const EffectPlan& plan) {
     const TrainOptions options = probed_options(flags);
@@ -245,7 +246,7 @@ SceneEvaluation evaluation_of(const Dataset& dataset, const TrainOptions& run) {
 
 namespace {
 
-/// Both ways, which prepare() makes of the options that the plan leaves.
+/// Runs both ways, which prepare() makes from the options that the plan leaves.
 Trial run_trial(const DeviceOptions& device_options, const Dataset& source,
                 const TrainOptions& options, const EffectPlan& plan, Trial trial,
                 const std::function<void(TrainOptions& usual, TrainOptions& tried)>& prepare,

@@ -45,7 +45,7 @@ struct FilmFlags {
     std::filesystem::path path, around;
     std::string size, up;  // size: empty where not given
     int fps = 0;           // 0: not given
-    double seconds = 6;    // of a turn
+    double seconds = 6;    // time of one turn
 };
 
 struct RenderFlags {

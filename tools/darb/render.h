@@ -43,7 +43,7 @@ class DepthFiles {
 
   private:
     DepthFlags flags_;
-    DepthRange range_;  // of all that were written
+    DepthRange range_;  // range over all that were written
 };
 
 }  // namespace darb

@@ -22,7 +22,7 @@
 namespace darb {
 
 namespace {
-struct ViewNumbers {  // of a view, on its way from another rank
+struct ViewNumbers {  // numbers of one view, on their way from another rank
     double psnr_db, ssim;
     bool has_depth;
     DepthError depth;

@@ -20,11 +20,11 @@ struct SceneEvaluation {
     Accuracy accuracy = preset_accuracy(kBalanced);
     EffectChoice effects;
     glm::vec3 background{0.0f};
-    bool fit_exposure = false;   // of each picture to its photo, before measuring
-    bool align_cameras = false;  // each to its photo first, by CameraAlignment
-    bool alpha_is_mask = false;  // of the data set
+    bool fit_exposure = false;   // fit each picture's to its photo first
+    bool align_cameras = false;  // align each camera to its photo first, by CameraAlignment
+    bool alpha_is_mask = false;  // as the data set has it
     double depth_scale = 1;      // likewise; measured depths are compared where views have them
-    Ranks* ranks = nullptr;      // that measure the views by turns; null: this process does all
+    Ranks* ranks = nullptr;      // ranks that measure views in turn; null: this process does all
 };
 
 /// What a model's pictures of these views have, and their means; views: at the size to measure at.

@@ -7,7 +7,7 @@ namespace darb {
 
 namespace {
 
-constexpr int kShellBase = 128;  // of a shell's exit code for a signal
+constexpr int kShellBase = 128;  // plus the signal's number: a shell's exit code
 
 // A signal handler can reach nothing else.
 std::atomic<bool> g_stop{false};

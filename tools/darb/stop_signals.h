@@ -14,9 +14,9 @@ void go_on_without_readers();
 /// The same for SIGXFSZ, a limit of the size of files.
 void fail_at_the_file_limit();
 
-/// Of the signal that set it: 128 and its number, as shells have it; 0: none.
+/// Exit code for the signal that set it: 128 and its number, as shells have it; 0: none.
 int stop_exit_code();
-/// "SIGTERM"; empty: none.
+/// Name of that signal, as "SIGTERM"; empty: none.
 const char* stop_name();
 
 }  // namespace darb

@@ -13,7 +13,7 @@ namespace darb {
 
 struct TrainFlags {
     TrainRequest request;  // once the command line has been parsed
-    GivenOptions given;    // what it names, as it was typed
+    GivenOptions given;    // options that were named, as they were typed
     RunShown shown;
     bool retune = false;
     bool deterministic = false;  // every run is; the flag only lets scripts say so

@@ -100,7 +100,7 @@ void print_advice(const Device& device, const Dataset& dataset, const Forecast& 
         say("hint:{}\n", advice);
 }
 
-constexpr double kSlowSeconds = 1'800;  // of a bare run: from here on a quicker one is suggested
+constexpr double kSlowSeconds = 1'800;  // a bare run that takes longer is told of a quicker one
 
 // The data set with photos of at most that width.
 Dataset at_width(Dataset dataset, int width) {

@@ -7,8 +7,8 @@
 namespace darb {
 
 /// Prints views, notes, and the forecast of splats, time and memory on this device, which takes a
-/// few seconds; of a quiet run nothing but a warning. Leaves the forecast of the pace in the job,
-/// of a quiet run too, as run.jsonl has it.
+/// few seconds; for a quiet run only a warning. Leaves the forecast of the pace in the job, even
+/// for a quiet run, as run.jsonl has it.
 void print_plan(Device& device, TrainJob& job, bool quiet);
 
 /// A note for find_start(), which takes about a second of a core for each photo.

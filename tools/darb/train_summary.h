@@ -14,7 +14,8 @@ struct RunShown {
     bool view = false;                    // in a window
 };
 
-/// Of a quiet run the paths, and what goes on with one that was interrupted in its folder `output`.
+/// For a quiet run only the paths, and where it was interrupted, the command that goes on with it
+/// in its folder `output`.
 std::string summary_text(const TrainResult& summary, const RunShown& shown,
                          const std::filesystem::path& output, const RankGroup& ranks);
 

@@ -97,7 +97,7 @@ void refuse_other_pictures(const std::filesystem::path& file) {
                 "Use .png or .jpg.");
 }
 
-// As its ending says; PNG where it has none.
+// Writes the format that the name's ending says; PNG where it has none.
 void write_screenshot(const std::filesystem::path& file, const ImageU8& image) {
     if (is_jpeg_name(file))
         write_file_atomic(file, encode_jpeg(image, kJpegQuality));
@@ -169,7 +169,7 @@ int view(ViewFlags flags) {
     if (const auto kept = state_folder(); !kept.empty()) {
         options.up_list = kept / "up.json";
         const bool window = flags.screenshot.empty() && flags.frames.empty() && flags.times.empty();
-        if (window) options.recent_list = kept / "recent.json";  // of what a person opened
+        if (window) options.recent_list = kept / "recent.json";  // what a person opened
     }
     if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())
@@ -305,7 +305,7 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
 
 namespace {
 
-constexpr double kTurn_s = 20;  // of a whole turn
+constexpr double kTurn_s = 20;  // time of a whole turn
 constexpr int kCompared = 6;    // frames in motion, each a sixth of a turn from the one before
 
 }  // namespace
@@ -367,7 +367,7 @@ std::vector<double> compare_motion(const MeasuredView& m) {
 
 namespace {
 
-constexpr double kMotion_s = 5;  // of the orbit
+constexpr double kMotion_s = 5;  // time of the orbit
 constexpr int kRests = 5;
 
 /// "VmHWM", the most memory that the process has had, bytes; 0 where the system does not say.

@@ -16,7 +16,7 @@ struct ViewFlags {
     std::filesystem::path scene, cameras, screenshot, path, frames, times;
     std::string device, up, beside, size = "1280x720", show = "picture", style = "splats";
     int camera = -1, fps = 30;
-    float gui_scale = 0;  // of the panels; 0: the display's
+    float gui_scale = 0;  // size of the panels; 0: the display's
     bool white_background = false, compare = false, difference = false, no_panels = false,
          quiet = false, force = false;
     std::vector<std::filesystem::path> kernel_files;

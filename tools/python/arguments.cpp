@@ -70,7 +70,7 @@ void check_shape(const py::array& array, const char* name,
                 "Check the order of the arguments, and the arrays' axes.");
 }
 
-// Of a fixed length, and without a way out, so that compilers take several at once.
+// The loop has a fixed length and no early exit, so that compilers take several values at once.
 constexpr std::size_t kBlock = 128, kFloatsOfPiece = 2048 * kBlock;
 bool block_is_within(const float* values, float least, float most) {
     int inside = 1;

@@ -8,7 +8,7 @@ namespace darb::python {
 
 namespace {
 
-constexpr double kRigid = 1e-3;  // of R R^T from 1: what float32 leaves of many multiplied matrices
+constexpr double kRigid = 1e-3;  // how far R R^T may be from 1, as products of float32 drift
 
 Camera camera_of(const double* m, const double* k, std::size_t index) {
     Camera camera;

@@ -23,7 +23,7 @@ struct RendererKey {
     int kernel = 0;
     Footprint footprint = Footprint::psi;
     bool antialias = false, direct_colour = false, linear = false, camera = false;
-    int preset = 0;  // of accuracy
+    int preset = 0;  // accuracy preset
 
     bool operator==(const RendererKey&) const = default;
 };
@@ -42,7 +42,7 @@ class Renderers {
     /// A new one, which begins with the model.
     KeptRenderer& make(Device& device, const RendererKey& key, const SplatModel& model);
     void clear() { kept_.clear(); }
-    /// To be left behind, in a child process.
+    /// Leaves the renderers behind, in a child process.
     void leak() { static_cast<void>(new std::list<KeptRenderer>(std::move(kept_))); }
 
   private:

@@ -8,9 +8,9 @@
 
 namespace darb::python {
 
-/// Of a darb.Kernel; nothing for anything else.
+/// The kernel of a darb.Kernel; nothing for anything else.
 std::optional<int> kernel_of_object(const py::object& value);
-/// A row of engine/kernels: by its name, or of a darb.Kernel.
+/// A row of engine/kernels, by its name or from a darb.Kernel.
 int take_kernel(const py::object& value, const char* name);
 Footprint take_footprint(const py::object& value);
 

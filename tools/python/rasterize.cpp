@@ -40,7 +40,7 @@ RendererKey key_of(const SplatModel& header, const Pictures& pictures,
     return key;
 }
 
-// From where the arrays lie, into the buffers of a call before of as many splats.
+// Copies from where the arrays lie into the buffers of an earlier call, if that had as many splats.
 void put(KeptRenderer& kept, const SplatArraysGiven& given) {
     GradientRenderer& renderer = kept.renderer;
     if (!renderer.holds(given.count(), given.header.sh_degree))
@@ -79,7 +79,7 @@ PyScene* scene_of(const std::shared_ptr<PyDevice>& device, const py::dict& optio
     return scene;
 }
 
-// Of all cameras one after the other; of a single one without a copy.
+// The images of all cameras one after the other; a single one is not copied.
 py::array image_array(std::vector<ImageF> images, bool with_channels) {
     const ImageF& first = images.front();
     std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(images.size()), first.height,
@@ -95,7 +95,7 @@ py::array image_array(std::vector<ImageF> images, bool with_channels) {
     return array;
 }
 
-// Of [H][W][2] the first.
+// The first channel of [H][W][2].
 ImageF depth_alone(const ImageF& both) {
     ImageF depth(both.width, both.height, 1);
     for (std::size_t i = 0; i < depth.data.size(); ++i) depth.data[i] = both.data[2 * i];

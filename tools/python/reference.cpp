@@ -31,7 +31,7 @@ reference::Splats<double> splats_of(const SplatArraysGiven& given) {
     return splats;
 }
 
-// From logits, logarithms and harmonics to what was given.
+// Turns gradients by logits, logarithms and harmonics into gradients by what was given.
 void to_given(const SplatArraysGiven& given, reference::SplatGradients<double>& d) {
     auto& d_opacity = attribute_values(d, ATTRIBUTE_OPACITY_LOGIT);
     const std::span<const float> opacities = given.opacities.values();

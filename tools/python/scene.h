@@ -22,16 +22,16 @@ class PyScene {
 
     /// Before the first renderer(), with the GIL: changes wait from then on for what draws.
     void lie_on(const std::shared_ptr<PyDevice>& device);
-    /// With the splats as they are now. The caller holds the device's lock.
+    /// A renderer with the splats as they are now. The caller holds the device's lock.
     KeptRenderer& renderer(const RendererKey& key);
 
   private:
     void change(const std::function<void()>& change);
 
-    // Its arrays never move, as numpy looks at them: that of shapes grows once, from none.
+    // Its arrays never move, as numpy looks at them; only that of shapes grows once, from none.
     SplatModel model_;
     Renderers renderers_;
-    std::shared_ptr<PyDevice> device_;  // of the renderers
+    std::shared_ptr<PyDevice> device_;  // device of the renderers
     std::uint64_t changes_ = 1;
     std::vector<std::pair<RendererKey, std::uint64_t>> uploaded_;  // changes_ at the time
 };

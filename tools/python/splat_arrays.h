@@ -7,12 +7,12 @@
 
 namespace darb::python {
 
-/// The arrays where they lie. Opacities and scales are these themselves
-/// (GradientOptions::linear_values).
+/// The caller's arrays, where they lie. Opacities and scales are plain values, neither logits nor
+/// logarithms (GradientOptions::linear_values).
 struct SplatArraysGiven {
-    SplatModel header;  // of no splats
+    SplatModel header;  // has no splats
     Floats means, quats, scales, opacities, colours;
-    Floats shapes;               // of a kernel that takes them; else none
+    Floats shapes;               // for a kernel that takes them; else none
     bool direct_colour = false;  // colours is `colors`, not `sh`
 
     std::size_t count() const { return opacities.size(); }
@@ -22,13 +22,13 @@ struct SplatArraysGiven {
     /// Whether finite values of the attribute, kShDc for colours, are in its range. Needs no GIL.
     static bool accepts(int attribute, std::span<const float> values);
     GivenValues values() const;
-    /// A copy with all, checked; sh_dc holds `colors` where these are given.
+    /// A copy of all, checked; sh_dc holds `colors` where these are given.
     SplatModel model() const;
 };
 
-/// Of 1, 4, 9 or 16 coefficients; Error for others.
+/// The degree that has 1, 4, 9 or 16 coefficients; throws Error for other numbers.
 int degree_of_coefficients(py::ssize_t coefficients);
-/// [N] of a kernel with shapes: zeros, at which training starts, where it is None. Throws Error
+/// [N] for a kernel with shapes; where it is None, zeros, at which training starts. Throws Error
 /// where the kernel takes none.
 Floats take_shapes(const py::object& value, int kernel, py::ssize_t count);
 /// sh [N,K,3] into the first band [N,3] and the others [N,K-1,3].

@@ -36,7 +36,7 @@ constexpr OfCommand kOfCommand[] = {
     {"checkpoint_interval", "Call checkpoint(path) when you want it."},
 };
 
-// Of how the command shows a run, which no request holds.
+// How the command shows a run, which no request holds.
 constexpr OfCommand kShown[] = {
     {"view", "Render with scene().render(...) between two steps."},
     {"quiet", "Nothing is printed in any case."},

@@ -12,7 +12,8 @@ namespace darb {
 
 namespace {
 
-// Of the half picture, to each side: splats beyond may still reach into it.
+// In half widths and heights of the picture, to each side: a splat beyond the edge may reach into
+// it.
 constexpr double kBesidePicture = 1.3;
 constexpr double kDeviations = 3;
 
@@ -49,7 +50,7 @@ Dataset block_dataset(const Dataset& whole, const std::vector<std::size_t>& view
     Dataset block = whole;
     block.views.clear();
     for (const std::size_t v : views) block.views.push_back(whole.views[v]);
-    block.points.seen_begin.clear();  // of all views
+    block.points.seen_begin.clear();  // refers to the views of the whole
     block.points.seen_by.clear();
     return block;
 }

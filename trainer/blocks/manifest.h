@@ -13,21 +13,21 @@ namespace darb {
 
 enum class PartState { waiting, training, done, failed };
 
-/// Of the coarse model, or of a block.
+/// State and results of the coarse model or of one block.
 struct PartRecord {
     PartState state = PartState::waiting;
-    std::string error;             // of a part that failed
+    std::string error;             // why the part failed
     std::uint32_t frozen = 0;      // splats of its surroundings
-    std::uint32_t splats = 0;      // all at the end, the frozen ones included
-    std::uint32_t kept = 0;        // of these, in its cell
-    std::uint64_t peak_bytes = 0;  // of device memory
-    double seconds = 0;            // of training
+    std::uint32_t splats = 0;      // splats at the end, the frozen ones included
+    std::uint32_t kept = 0;        // splats at the end that lie in its cell
+    std::uint64_t peak_bytes = 0;  // peak of device memory
+    double seconds = 0;            // time that training took
 };
 
 struct BlockRecord {
     std::string name;  // COLUMNxROW, from 0; its folder
     std::size_t points = 0;
-    std::vector<std::size_t> views;  // by their places among the training views
+    std::vector<std::size_t> views;  // indices among the training views
     PartRecord part;
 };
 
@@ -35,11 +35,11 @@ struct BlocksManifest {
     std::string settings;          // settings_text()
     std::string dataset;           // dataset_fingerprint() without photos
     std::uint64_t max_memory = 0;  // bytes of device memory; 0: no bound
-    double coarse_scale = 0;       // of the photos' sides, for the coarse model
+    double coarse_scale = 0;       // scale of the photos' sides for the coarse model
     Partition cells;
     PartRecord coarse;
     std::vector<BlockRecord> blocks;
-    std::uint32_t joined = 0;  // splats of the scene; 0: not yet
+    std::uint32_t joined = 0;  // splats of the joined scene; 0: not joined yet
     std::size_t held_out = 0;  // views that it was measured on
     double psnr_db = 0, ssim = 0;
 };
@@ -48,12 +48,12 @@ std::string block_name(const Partition& cells, std::size_t cell);
 
 void write_manifest(const std::filesystem::path& path, const BlocksManifest& manifest);
 
-/// What a file holds; cells: columns and rows alone, which say what they are with the data set.
+/// What a file holds. Of the cells it has columns and rows only; the data set gives the rest.
 /// Throws Error naming file and key.
 BlocksManifest read_manifest(const std::filesystem::path& path);
 
-/// Throws Error naming what differs where the manifest is of other settings or another data set,
-/// or of other blocks than were asked for (0: whatever it has).
+/// Throws Error naming what differs where the manifest is for other settings, another data set, or
+/// other blocks than were asked for (0: whatever it has).
 void check_manifest(const BlocksManifest& manifest, const std::filesystem::path& path,
                     const BlocksManifest& now, const Grid& asked);
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kNoLimitOfCell = std::numeric_limits<double>::infinity();
 constexpr int kPowerSteps = 500;
-constexpr double kWidthTail = 0.05;  // of the points, on each side, that say nothing about a width
+constexpr double kWidthTail = 0.05;  // share of the points at each end that a width ignores
 
 glm::dvec3 point_at(std::span<const double> points, std::size_t p) {
     return {points[3 * p], points[3 * p + 1], points[3 * p + 2]};

@@ -40,7 +40,7 @@ struct Cell {
     }
 };
 
-/// Of the middle nine tenths of a cell's points, the share of their width that a margin takes.
+/// Width of a margin, as a share of the width that the middle nine tenths of a cell's points take.
 constexpr double kMarginShare = 0.15;
 
 struct Partition {
@@ -50,7 +50,7 @@ struct Partition {
 
     /// The one cell that a place lies in.
     std::size_t cell_of(const glm::dvec3& world) const;
-    /// Of kRounds, the one in which a cell has its turn: cells of a round touch in corners at most.
+    /// Which of the kRounds rounds trains a cell: cells of one round touch at corners at most.
     int round_of(std::size_t cell) const {
         const auto in_column = static_cast<std::size_t>(rows);
         return static_cast<int>(cell / in_column % 2 * 2 + cell % in_column % 2);
@@ -69,8 +69,8 @@ struct CellCount {
 };
 std::vector<CellCount> count_points(const Partition& cells, std::span<const double> points);
 
-/// At least `blocks` cells, as few as a grid of this kind allows, whose columns and rows are to
-/// each other about as the widths of the ground.
+/// The grid with at least `blocks` cells, as few as possible, whose numbers of columns and rows are
+/// about in the ratio of the ground's widths.
 struct Grid {
     int columns = 1, rows = 1;
 };
@@ -79,9 +79,9 @@ Grid grid_for(int blocks, const GroundPlane& plane, std::span<const double> poin
 // Which cameras a block is trained on: those in whose pictures the splats of its cell, in the
 // coarse model of the whole, make up enough.
 
-/// Share of a picture from which on its camera sees a cell enough.
+/// Share of a picture from which on its camera sees enough of a cell.
 constexpr double kLeastShare = 0.05;
-/// A cell that fewer see enough gets those that see most of it.
+/// A cell that fewer cameras see enough of gets those that see most of it.
 constexpr std::size_t kFewestViews = 3;
 
 /// [view][cell]: the mean over the picture of sum alpha T over the splats of the cell, which is
@@ -91,23 +91,24 @@ std::vector<std::vector<double>> cell_shares(Device& device, const SplatModel& c
                                              const Partition& cells, const std::vector<View>& views,
                                              const ProjectionEffects& effects);
 
-/// [cell] the views, ascending, that show at least `least` of it, and of each view the cell that it
-/// shows most of; fewer than kFewestViews only where fewer show any of it.
+/// [cell]: the views, ascending, that show at least `least` of it or more of it than of any other
+/// cell. A cell has fewer than kFewestViews only where fewer show any of it.
 std::vector<std::vector<std::size_t>> choose_views(const std::vector<std::vector<double>>& shares,
                                                    double least = kLeastShare);
 
 // What the parts of a run in blocks are trained with.
 
-/// That all blocks together may come to: options.max_splats, or what a run of the whole is forecast
-/// to.
+/// How many splats all blocks together may have: options.max_splats, or the forecast for a run of
+/// the whole scene.
 std::uint32_t whole_splats(const Dataset& dataset, const TrainOptions& options);
-/// Of the coarse model of so many.
+/// How many splats the coarse model has when the whole may have so many.
 std::uint32_t coarse_splats(std::uint32_t whole);
-/// Half the iterations, no view-dependent colour, an eighth of the splats.
+/// Options of the coarse model: half the iterations, no view-dependent colour, an eighth of the
+/// splats.
 TrainOptions coarse_options(const Dataset& dataset, const TrainOptions& options);
-/// Degrees of colour by the iteration, without a probe. Beside the frozen ones, the share of
-/// options.max_splats that the cell with its margin has of the points; start: what the block begins
-/// with, at least.
+/// Options of a block: the colours' degree follows the iteration, without a probe. Besides the
+/// frozen splats it may have its share of options.max_splats, by the points in the cell with its
+/// margin, but at least `start`, which it begins with.
 TrainOptions block_options(const TrainOptions& options, const CellCount& count, std::size_t points,
                            std::uint32_t frozen, std::uint32_t start);
 

@@ -29,8 +29,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kCoarseScale = 0.5;        // of the photos' sides, at most
-constexpr std::uint64_t kCoarsePhotos = 4;  // 1 / share of the memory that its photos may take
+constexpr double kCoarseScale = 0.5;        // largest scale of the coarse model's photos
+constexpr std::uint64_t kCoarsePhotos = 4;  // 1 / share of the memory that they may take
 
 std::size_t points_in(const BlockRegion& region, const std::vector<double>& points) {
     std::size_t count = 0;
@@ -255,7 +255,7 @@ SplatModel BlocksRun::final_splats(std::size_t cell) const {
                        block.part.frozen, manifest_.cells, cell);
 }
 
-// Of cells that are done, in the margin of this one; none where no cell has any there.
+// Splats of finished cells that lie in the margin of this one; empty where there are none.
 SplatModel BlocksRun::splats_beside(const BlockRegion& region) const {
     const Cell& own = manifest_.cells.cells[region.cell];
     std::vector<SplatModel> parts;
@@ -443,8 +443,9 @@ BlocksSummary run_blocks(const BlocksJob& job, const std::atomic<bool>& stop) {
 namespace {
 
 constexpr int kMostBlocks = 1024;
-// Of the whole: the coarse model has such a share of the splats, a cell with its margin such a
-// multiple of its own share, and a block such a multiple of its share of the photos.
+// The coarse model has 1 / kCoarsePart of the scene's splats. A cell with its margin is taken to
+// have kWithMargin times its share of the splats, and a block kPhotosOfBlock times its share of the
+// photos.
 constexpr std::uint32_t kCoarsePart = 8;
 constexpr std::uint32_t kFewestCoarse = 1'000;
 constexpr double kWithMargin = 1.5, kPhotosOfBlock = 2.5;
@@ -473,7 +474,7 @@ TrainOptions coarse_options(const Dataset& dataset, const TrainOptions& options)
 TrainOptions block_options(const TrainOptions& options, const CellCount& count, std::size_t points,
                            std::uint32_t frozen, std::uint32_t start) {
     TrainOptions block = options;
-    block.probe_sh = false;  // what stands around has colours of every degree from the start
+    block.probe_sh = false;  // the surroundings have colours of every degree from the start
     if (!options.max_splats) return block;
     const double share = double(count.with_margin) / double(std::max<std::size_t>(points, 1));
     const auto own = static_cast<std::uint32_t>(share * *options.max_splats);

@@ -15,25 +15,25 @@
 namespace darb {
 
 struct BlocksJob {
-    const Dataset& dataset;  // of the whole; its photos are loaded by the parts
-    TrainOptions options;    // of each block; max_splats: of all blocks together
+    const Dataset& dataset;  // the whole data set; each part loads its own photos
+    TrainOptions options;    // for each block, except max_splats: for all together
     RunOptions run;          // output, quiet, report, checkpoint_interval, command, effects
     Grid asked{0, 0};        // 0: as many as max_memory_bytes, or the device, calls for
     bool resume = false;
-    Ranks& ranks;  // that train blocks by turns
-    /// A device of its own for each part, so that its peak is that part's.
+    Ranks& ranks;  // processes that train blocks in turn
+    /// Makes a new device for each part, so that its memory peak is that part's.
     std::function<std::unique_ptr<Device>()> device;
-    /// Of the joined scene, on the held-out views; without views where there are none.
+    /// Evaluates the joined scene on the held-out views; the result is empty where there are none.
     std::function<Evaluation(const SplatModel& scene)> evaluate;
 };
 
 struct BlocksSummary {
     BlocksManifest manifest;
-    std::filesystem::path scene;  // of the first rank; empty where the run was interrupted
+    std::filesystem::path scene;  // on the first rank; empty where the run was interrupted
     bool interrupted = false;
 };
 
-/// Throws Error where the data cannot be trained in blocks, where the manifest to resume is of
+/// Throws Error where the data cannot be trained in blocks, where the manifest to resume belongs to
 /// something else, and, after the others are done, naming each block that failed. The caller holds
 /// the RunLock of the folder.
 BlocksSummary run_blocks(const BlocksJob& job, const std::atomic<bool>& stop);

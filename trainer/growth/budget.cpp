@@ -8,7 +8,7 @@ namespace darb {
 
 namespace {
 
-// To the limit with the last round, the gap closing as a parabola, fast at first.
+// Reaches the limit with the last round; the gap closes as a parabola, fast at first.
 std::uint32_t close_the_gap(const TrainOptions&, const Schedule& schedule, int iteration,
                             std::uint32_t count, std::uint32_t limit) {
     if (count >= limit) return limit;

@@ -47,7 +47,7 @@ struct StrategySetup {
     Device& device;
     const TrainOptions& options;
     const Schedule& schedule;
-    double extent;  // of the scene, world units
+    double extent;  // extent of the scene, world units
 };
 
 }  // namespace darb

@@ -26,11 +26,12 @@ namespace {
 // it.
 constexpr double kFarOff = 4;
 
-// Of splats on surfaces (docs/experiments/dense_start.md): the standard deviation along the surface
-// as a share of the distance to the next point, that across it as a share of that along.
+// For splats on surfaces (docs/experiments/dense_start.md): the standard deviation along the
+// surface as a share of the distance to the next point, and that across it as a share of that along
+// it.
 constexpr double kSurfaceWidth = 0.6, kSurfaceThickness = 0.3, kSurfaceOpacity = 0.5;
 
-// Empty: random ones.
+// The points to start from; empty where the start is random.
 const PointCloud& given_points(const Dataset& dataset, const TrainOptions& options) {
     static const PointCloud kNone;
     if (options.start == StartPoints::random) return kNone;
@@ -83,7 +84,7 @@ PointCloud drawn_from(const PointCloud& cloud, std::uint32_t count, std::uint64_
             part.colour.push_back(cloud.colour[3 * order[i] + a]);
             if (!cloud.normal.empty()) part.normal.push_back(cloud.normal[3 * order[i] + a]);
         }
-        // As many cover the same surface.
+        // Fewer points cover the same surface.
         if (!cloud.spacing.empty())
             part.spacing.push_back(
                 cloud.spacing[order[i]] *

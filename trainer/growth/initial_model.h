@@ -37,11 +37,11 @@ std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options)
 // the data set's own points lies beside them.
 
 struct DenseStart {
-    PointCloud cloud;  // those on surfaces first, then the data set's, whose spacing is 0
+    PointCloud cloud;  // points on surfaces first, then the data set's, whose spacing is 0
     std::size_t on_surfaces = 0;
     double agreeing = 0;  // share of the photos' pixels whose depth several photos agree on
     double seconds = 0;
-    std::vector<std::string> names;  // of the photos' views
+    std::vector<std::string> names;  // names of the photos' views
     std::vector<StereoPhoto> photos;
     std::vector<PlaneMap> maps;
     std::vector<ImageU8> consistent;  // [H][W] of a photo: 255 where others agree

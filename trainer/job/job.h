@@ -23,24 +23,25 @@ struct TrainJob {
     Dataset dataset = {};
     std::vector<ImageU8> photos = {};  // [view] where the plan had to look at them; else empty
     EffectPlan effects = {};
-    std::optional<DenseStart> start = {};    // what stereo found; run() writes and lets go of it
+    std::optional<DenseStart> start = {};    // what stereo found; run() writes it and lets go of it
     std::filesystem::path resume_from = {};  // a checkpoint; empty: the run starts afresh
     std::optional<PaceForecast> pace = {};   // for the time that is left
-    // What was decided, a line for people each; may be empty.
+    // What was decided, one line of text each; may be empty.
     std::string cameras_note = {}, start_note = {}, strategy_note = {};
     std::vector<std::string> notes = {};  // options that are not used, and why
 };
 
-/// What the request comes to on this data set, the start aside. photos: as load_photos gives them,
-/// of every view; loaded here where the plan has to look at them and they are empty. looks: whether
-/// it may; a run in blocks leaves the photos to its parts. Throws Error.
+/// Works out what the request means for this data set, except for the splats to start from. photos:
+/// one of each view, as load_photos gives them; if empty, they are loaded here when the plan has to
+/// look at them. looks: whether it may look; a run in blocks leaves the photos to its parts. Throws
+/// Error.
 TrainJob resolve(TrainRequest request, Dataset dataset, std::vector<ImageU8> photos = {},
                  bool looks = true);
 
 /// Whether the run begins with points that stereo finds between its photos.
 bool starts_from_stereo(const TrainJob& job);
 
-/// Finds these points, about a second of a core for each photo; begins is called before it does.
+/// Finds these points, which takes a core about a second per photo; `begins` is called first.
 /// Throws Error where the request asks for a start that the data set cannot have.
 void find_start(Device& device, TrainJob& job, const std::function<void()>& begins = {});
 
@@ -49,15 +50,15 @@ struct JobSinks {
     bool quiet = false;                       // no progress on the terminal
     const std::atomic<bool>* stop = nullptr;  // set by others: the run saves itself and ends
     std::function<double(const LiveStep&)> on_step = {};  // see RunOptions::on_step
-    RankGroup ranks = {};                                 // that train together
+    RankGroup ranks = {};                                 // processes that train together
 };
 
 /// Trains the job into its output folder; see run_training(). Lets go of the job's photos and
 /// start. The caller holds the folder's RunLock.
 TrainResult run(Device& device, TrainJob& job, const JobSinks& sinks = {});
 
-/// All of it in one call: loads the data, through COLMAP where photos have no cameras, resolves the
-/// request, finds the start and trains; what `darb train` does, without what it prints. Takes and
+/// Everything in one call: loads the data, through COLMAP where photos have no cameras, resolves
+/// the request, finds the start and trains, as `darb train` does, but prints nothing. Takes and
 /// gives back the RunLock of the output folder. Throws Error.
 TrainResult train(Device& device, TrainRequest request, const JobSinks& sinks = {});
 

@@ -27,8 +27,8 @@ constexpr std::size_t kHeadBytes = 1 << 16;  // EXIF is the first segment of a J
 
 struct Pictures {
     std::vector<fs::directory_entry> photos;
-    std::map<std::string, std::size_t> foreign;  // by extension
-    fs::path cameras;                            // one file or folder of them
+    std::map<std::string, std::size_t> foreign;  // how many, by extension
+    fs::path cameras;                            // a file or folder of cameras
 };
 
 bool names_cameras(const std::string& name) {

@@ -14,15 +14,15 @@ namespace darb {
 std::filesystem::path photos_without_cameras(const std::filesystem::path& path,
                                              const std::string& images_folder);
 
-/// What says that photos follow each other in the order of their names.
+/// What tells that photos follow each other in the order of their names.
 enum class PhotoOrder { none, times, numbers };
 
 struct PhotoList {
-    std::string text;  // a line a photo: tells whether OUT/colmap was made from the same ones
-    std::vector<std::string> names;  // below the folder, in order
+    std::string text;  // one line per photo: tells whether OUT/colmap was made from them
+    std::vector<std::string> names;  // paths below the folder, in order
     bool one_size = true;
     PhotoOrder order = PhotoOrder::none;
-    std::string left_out;  // pictures of formats that are not read, and the way round; may be empty
+    std::string left_out;  // pictures in formats that are not read, with a remedy; may be empty
 };
 
 /// times: when each was taken, empty where that is not known. names: in the order of their bytes,

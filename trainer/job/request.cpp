@@ -68,7 +68,7 @@ class Entries {
 
     const Json json_;
     const fs::path file_;
-    std::map<std::string, std::set<std::string>> known_;  // by section
+    std::map<std::string, std::set<std::string>> known_;  // keys by section
 };
 
 // A kernel of one's own is registered again.

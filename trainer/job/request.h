@@ -27,8 +27,8 @@ struct TrainRequest {
 
     // What it trains. Kernel, footprint, accuracy and strategy are members of `train`.
     TrainOptions train;
-    std::string preset;  // of trainer/options/presets.h, whose values are in the others; empty:
-                         // none was named
+    std::string preset;  // name in trainer/options/presets.h; the other members have its values;
+                         // empty: none was named
     std::string schedule = "darb";        // or 3dgs, whose values use_schedule() puts into `train`
     std::string effects = "auto";         // as parse_effects() reads them
     std::string refine_cameras = "auto";  // auto: as the plan of effects says; on; off
@@ -41,7 +41,7 @@ struct TrainRequest {
     std::string tune;          // forms of passes, as parse_tuning() reads them; empty: the device's
     bool allow_mixed = false;  // ranks may have different devices
     std::vector<int> test_iterations, save_iterations, checkpoint_iterations;
-    int checkpoint_interval = 1'000;  // of checkpoint.darb; 0: only at the end and Ctrl-C
+    int checkpoint_interval = 1'000;  // iterations; 0: checkpoint only at the end and on Ctrl-C
     bool report = true;               // OUT/report.html at the end
     bool page = false;                // OUT/scene.html at the end; the command writes it
 
@@ -49,7 +49,7 @@ struct TrainRequest {
     bool resume = false;  // from OUT/checkpoint.darb
     std::filesystem::path start_checkpoint;
 
-    // Of asking alone, not saved.
+    // Not saved in request.json.
     std::filesystem::path depths;    // as 3DGS spells +depth: complete_request() takes it apart
     std::vector<std::string> given;  // options that were set by name, as "--iterations"
     std::vector<std::string> notes;  // what readers of kernels say of them
@@ -78,11 +78,11 @@ std::filesystem::path checkpoint_to_resume(const TrainRequest& request);
 /// Throws Error where two things that were asked for contradict each other.
 void check_request(const TrainRequest& request);
 
-/// What was asked for and changes nothing in this run, and why, a line for people each.
+/// What was asked for but changes nothing in this run, and why, one line of text each.
 std::vector<std::string> unused_options(const TrainRequest& request);
 
-/// As JSON, for OUT/request.json. Paths are as seen from the output folder, so that folder and
-/// photos can move together. `resume` and `output` are left out.
+/// The request as JSON, for OUT/request.json. Paths are as seen from the output folder, so that
+/// folder and photos can move together. `resume` and `output` are left out.
 std::string request_text(const TrainRequest& request);
 
 /// Reads OUT/request.json back, with `resume` set. Throws Error that names the file and the entry.

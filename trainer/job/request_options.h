@@ -24,10 +24,10 @@ using RequestPlace = std::variant<std::monostate, bool*, int*, std::string*, std
 
 struct RequestOption {
     OptionRow row = {};      // names, heading, help, default, limits; its member, where it has one
-    const char* words = "";  // what it takes, with commas; "": anything of its kind
-    const char* section = "";    // of request.json, in which the entry lies; "": outside of all
-    std::string key = {};        // of the entry; "": there is none, other entries hold what it sets
-    bool several = false;        // takes one value after the other, and keeps them all
+    const char* words = "";  // words that it accepts, with commas; "": any of its kind
+    const char* section = "";    // section of request.json that holds the entry; "": none
+    std::string key = {};        // key of the entry; "": none, other entries hold what it sets
+    bool several = false;        // may be given several times, and keeps every value
     bool before_others = false;  // whatever stands after it may name what it brings
     RequestPlace (*place)(TrainRequest&) = nullptr;
     /// What a typed value does, the text of an entry, and what that does when it is read back;

@@ -21,7 +21,7 @@ using Rows = std::vector<RequestOption>;
 using Request = TrainRequest;
 using Text = const std::string&;
 
-constexpr const char* kStarts[] = {"auto", "points", "dense", "random"};  // by StartPoints
+constexpr const char* kStarts[] = {"auto", "points", "dense", "random"};  // indexed by StartPoints
 
 const char* lens_of(const DatasetOptions& data) {
     return data.original_lens ? "original" : data.original_where_wide ? "auto" : "undistort";

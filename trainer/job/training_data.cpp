@@ -34,7 +34,8 @@ constexpr int kAnySize = 100'000;       // px: no limit
 constexpr std::size_t kFewPhotos = 40;  // up to here preview compares all pairs, too
 constexpr double kLineSeconds = 10;     // between two lines where there is no terminal
 
-// Of a phone's 30 pictures a second two; enough to find cameras by, no more than COLMAP can match.
+// Two of a phone's 30 pictures a second: enough to find the cameras, few enough for COLMAP to
+// match.
 constexpr std::size_t kEveryFrame = 15, kLeastFrames = 60, kMostFrames = 240;
 
 // Both at once: a video needs both.

@@ -93,7 +93,7 @@ std::vector<StepOutcome> run_part(TrainingStep& step, GradientTree& tree,
     return outcomes;
 }
 
-// Of all views, in order, those of the other ranks as they tell them.
+// The outcomes of all views, in order; the other ranks report theirs.
 std::vector<StepOutcome> outcomes_of_all(Ranks& ranks, std::vector<StepOutcome> own) {
     std::vector<ViewReport> reports;
     for (const StepOutcome& o : own)
@@ -186,9 +186,9 @@ std::vector<StepOutcome> run_batch_step(TrainingStep& step, GradientTree& tree,
 
 namespace {
 
-constexpr AttributeRows kPairs{2, 0};  // of views
+constexpr AttributeRows kPairs{2, 0};  // layout of views()
 
-// What travels of a splat, one buffer after the other: visit(buffer, its rows, floats in use).
+// Calls visit(buffer, its rows, floats in use) for each buffer of a splat's that travels.
 template <class Gradients, class Visit>
 void for_each_column(Gradients& gradients, int sh_degree, Visit visit) {
     visit(gradients.views(), kPairs, std::size_t{2});

@@ -13,7 +13,7 @@ namespace darb {
 
 class GradientTree {
   public:
-    /// Of batches of so many views at most, a power of two.
+    /// For batches of at most `batch` views, a power of two.
     GradientTree(Device& device, int batch);
 
     /// Device memory of a tree of so many views, with the buffers of reserve().
@@ -21,15 +21,16 @@ class GradientTree {
     /// Buffers for these splats; where they change, what they held is gone. The queue must be idle.
     void reserve(const GpuSplats& splats);
 
-    /// Begins a batch, of no view.
+    /// Begins a batch, with no view yet.
     void begin() { views_ = held_ = 0; }
     /// Where the next view leaves its gradients.
     GradientBuffers& leaf() { return nodes_[static_cast<std::size_t>(held_)]; }
-    /// That view is there: adds what now has its pair.
+    /// The next view's gradients are there: adds every pair that is now complete.
     void record_view(Commands& commands);
-    /// No view follows: adds what is left, whose pair has no view, in the order of the tree.
+    /// No view follows: adds what is left without a partner, in the order of the tree.
     void record_end(Commands& commands);
-    /// Of all views, after record_end; another process's, too, once it is added.
+    /// The sum over all views, after record_end; includes another process's views once they are
+    /// added.
     GradientBuffers& sum() { return nodes_.front(); }
     /// Room for the sum of other views, to be added to that of these.
     GradientBuffers& other() { return nodes_[1]; }
@@ -39,7 +40,7 @@ class GradientTree {
 
     Device* device_;
     std::vector<GradientBuffers> nodes_;  // sums of complete subtrees, the largest first, a leaf
-    int views_ = 0, held_ = 0;            // so far; nodes that hold something
+    int views_ = 0, held_ = 0;            // views so far; nodes that hold something
 };
 
 /// views: in the order of their places, which their inputs name; fewer than the batch at the end of
@@ -48,11 +49,11 @@ std::vector<StepOutcome> run_batch_step(TrainingStep& step, GradientTree& tree,
                                         const GpuSplats& splats, std::vector<StepInput>& views,
                                         Ranks& ranks, int batch);
 
-/// What one rank's gradients are for another: which rows any of its views showed, a bit a splat,
-/// and these rows, of the degree of harmonics in use. The queue must be idle.
+/// One rank's gradients as bytes for another: which rows any of its views showed, a bit per splat,
+/// and these rows, up to the degree of harmonics in use. The queue must be idle.
 Bytes packed_gradients(const GradientBuffers& gradients, int sh_degree);
-/// Back into buffers of as many splats; rows that are not there are 0. Throws Error where the bytes
-/// are not of such gradients.
+/// Puts such bytes back into buffers for as many splats; rows that are not there become 0. Throws
+/// Error where the bytes are not such gradients.
 void unpack_gradients(std::span<const std::byte> bytes, int sh_degree, GradientBuffers& to);
 
 }  // namespace darb

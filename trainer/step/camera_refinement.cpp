@@ -15,15 +15,15 @@ namespace darb {
 namespace {
 
 constexpr double kBeta1 = 0.9, kBeta2 = 0.99;  // a camera is visited some dozen times
-constexpr double kLastShare = 0.02;            // of the rate, at the end of the run
-// Of the poses' rate, over a round of the photos: each visit moves the pictures of all of them.
+constexpr double kLastShare = 0.02;            // share of the rate at the end of the run
+// As a share of the poses' rate, over a round of the photos: each visit moves all their pictures.
 constexpr double kIntrinsicsShare = 0.5;
 // px a visit, where tracks anchor a pose and where pictures alone are to find it.
 constexpr double kAnchoredRate_px = 0.1, kFreeRate_px = 0.5;
-constexpr std::size_t kMostTracks = 1'000;  // of a photo, that anchor it
-constexpr double kHuberPx = 1;              // beyond, tracks pull no stronger
+constexpr std::size_t kMostTracks = 1'000;  // most tracks that anchor one photo
+constexpr double kHuberPx = 1;              // beyond this error tracks pull no harder
 constexpr std::size_t kFewestCameras = 3;
-constexpr std::size_t kPointsOfAll = 20'000;  // of a set without tracks, for the length of a step
+constexpr std::size_t kPointsOfAll = 20'000;  // points that size a step where there are no tracks
 
 std::vector<glm::dvec3> positions(const PointCloud& points) {
     std::vector<glm::dvec3> all;
@@ -33,7 +33,7 @@ std::vector<glm::dvec3> positions(const PointCloud& points) {
     return all;
 }
 
-// Of one view those that its photo saw; of a set without tracks some of all, the same for each.
+// For each view the points that its photo saw; without tracks, the same sample of all for each.
 std::vector<std::vector<glm::dvec3>> points_by_view(const Dataset& dataset,
                                                     const std::vector<glm::dvec3>& points) {
     const PointCloud& cloud = dataset.points;
@@ -189,7 +189,7 @@ bool CameraRefinement::step(int iteration, std::span<const CameraVisit> visits) 
         Pose& pose =
             poses_[static_cast<std::size_t>(pose_of_[static_cast<std::size_t>(visit.view)])];
         CameraGradient d = visit.gradient;
-        const double x = double(visit.width) / camera(visit.view).width;  // of smaller photos
+        const double x = double(visit.width) / camera(visit.view).width;  // photos may be smaller
         const double y = double(visit.height) / camera(visit.view).height;
         d.d_fx *= x, d.d_cx *= x, d.d_fy *= y, d.d_cy *= y;
         add_anchor(pose, d);

@@ -24,16 +24,16 @@ namespace darb {
 struct CameraMoves {
     std::size_t cameras = 0;
     double median_px = 0, largest_px = 0;
-    double median_degrees = 0, largest_degrees = 0;  // of the turn
+    double median_degrees = 0, largest_degrees = 0;  // angle that a camera turned by
     double largest_focal = 0;                        // share by which a focal length changed
-    double largest_centre_px = 0;                    // of a principal point
+    double largest_centre_px = 0;                    // shift of a principal point
 };
 
-/// What one photo of a step says.
+/// What one photo of a step says about its camera.
 struct CameraVisit {
-    int view = 0;  // of Dataset::views
+    int view = 0;  // index in Dataset::views
     CameraGradient gradient;
-    int width = 0, height = 0;  // px, of the picture
+    int width = 0, height = 0;  // size of the picture, px
 };
 
 class CameraRefinement {
@@ -41,7 +41,8 @@ class CameraRefinement {
     /// Throws Error where fewer than three photos are trained on.
     CameraRefinement(const Dataset& dataset, const TrainOptions& options);
 
-    /// The camera of a view at its whole size, as refined; a held-out one has its intrinsics alone.
+    /// The refined camera of a view at its whole size; of a held-out one only the intrinsics are
+    /// refined.
     const Camera& camera(int view) const { return cameras_[static_cast<std::size_t>(view)]; }
 
     /// After an iteration's step of the splats; nothing happens before the run's share
@@ -68,9 +69,9 @@ class CameraRefinement {
         Trained<6> trained;
         std::vector<TrackObservation> tracks;
     };
-    struct Group {  // of views with the same intrinsics
+    struct Group {  // views with the same intrinsics
         double trained_views = 0;
-        glm::dvec4 unit{1.0};  // of fx, fy, cx, cy: what shifts a picture by 1 px
+        glm::dvec4 unit{1.0};  // change of fx, fy, cx, cy that shifts a picture by 1 px
         Trained<4> trained;
     };
     double rate(int iteration) const;
@@ -82,8 +83,8 @@ class CameraRefinement {
     double rate_px_, anchor_, from_;
     int iterations_;
     std::vector<Camera> start_, cameras_;  // [view]
-    std::vector<glm::dvec3> points_;       // of the data set, fixed
-    std::vector<Pose> poses_;              // of the training photos, in order
+    std::vector<glm::dvec3> points_;       // points of the data set, which stay fixed
+    std::vector<Pose> poses_;              // one per training photo, in order
     std::vector<Group> groups_;
     std::vector<int> pose_of_, group_of_;  // [view], pose -1: held out
     Gauge gauge_;
@@ -94,18 +95,18 @@ class CameraRefinement {
 
 class CameraAlignment {
   public:
-    /// Of this model's pictures.
+    /// Aligns cameras with pictures of this model.
     CameraAlignment(Device& device, const SplatModel& model, const Accuracy& accuracy = {});
 
-    /// The camera, turned and moved; intrinsics stay. 40 steps of Adam on the mean squared error,
-    /// of 0.2 px at first and 0.01 px in the end; that with the least error on the way counts.
-    /// photo: RGBA of the camera's size. Masked pixels do not count where alpha is a mask.
+    /// The camera, turned and moved; its intrinsics stay. Takes 40 steps of Adam on the mean
+    /// squared error, from 0.2 px at first to 0.01 px in the end, and returns the best camera on
+    /// the way. photo: RGBA of the camera's size. Masked pixels do not count where alpha is a mask.
     Camera align(const Camera& camera, const ImageU8& photo, const glm::vec3& background,
                  bool alpha_is_mask);
 
   private:
     GradientRenderer renderer_;
-    std::vector<glm::dvec3> places_;  // of splats
+    std::vector<glm::dvec3> places_;  // centres of splats
     double depth_ = 1;
 };
 

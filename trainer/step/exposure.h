@@ -20,28 +20,28 @@ namespace darb {
 using ColourMap = std::array<float, 12>;
 constexpr ColourMap kIdentityColours = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-/// Least squares of apply_exposure(map, render, photo) against the photo over the background, over
-/// pixels that count (all, or alpha of at least 128 where alpha is a mask); held to the identity by
-/// a weight of 1e-6 a pixel, so that pictures of one colour have an answer.
+/// The map that fits apply_exposure(map, render, photo) to the photo over the background by least
+/// squares, over the pixels that count (all, or alpha of at least 128 where alpha is a mask); held
+/// to the identity by a weight of 1e-6 a pixel, so that pictures of one colour have an answer.
 ColourMap fit_exposure(const ImageF& render, const ImageU8& photo, const glm::vec3& background,
                        bool alpha_is_mask);
 
-/// RGB, not clamped. Where alpha is no mask a pixel is mapped by the share that the photo's alpha
-/// says: what is behind is the background, which no exposure changes.
+/// Returns RGB, not clamped. Where alpha is no mask, a pixel is mapped by the share that the
+/// photo's alpha says: what is behind is the background, which no exposure changes.
 ImageF apply_exposure(const ColourMap& map, const ImageF& image, const ImageU8& photo,
                       bool alpha_is_mask);
 
-/// The step of one photo's map.
+/// One step of Adam on a photo's map.
 struct ExposureStep {
     std::uint32_t photo = 0, pixels = 0;
-    float rate = 0;  // of Adam
-    int visits = 1;  // of this photo, this one counted
+    float rate = 0;  // Adam's learning rate
+    int visits = 1;  // visits to this photo, this one included
 };
 
 /// What a map applies to.
 struct ExposedPicture {
     const Buffer& image;          // float [3][H W]
-    const Buffer& transmittance;  // float [H W], what of the background is seen
+    const Buffer& transmittance;  // float [H W], share of the background that is seen
     glm::vec3 background;
     std::uint32_t width = 0;  // px, read for grids
 };
@@ -50,18 +50,18 @@ struct ExposedPicture {
 struct ExposureMaps {
     std::uint32_t photos = 0;
     bool grid = false;          // a grid of maps, EXPOSURE_GRID_*; false: one map
-    int batch = 1;              // views of a step
-    std::size_t terms() const;  // floats a photo
-    /// Of Exposure::state().
+    int batch = 1;              // views in a step
+    std::size_t terms() const;  // floats per photo
+    /// Length of Exposure::state(), floats.
     std::size_t state_size() const { return photos * terms() * 3; }
 };
 
-/// What these options train, of so many photos.
+/// The maps that these options train for so many photos.
 ExposureMaps exposure_maps(const TrainOptions& options, std::uint32_t photos);
 
 class Exposure {
   public:
-    /// For photos of at most `pixels` pixels, all identities.
+    /// For photos of at most `pixels` pixels; all maps begin as identities.
     Exposure(Device& device, const ExposureMaps& maps, std::uint64_t pixels);
 
     /// Device memory of an Exposure made with these arguments.
@@ -77,17 +77,18 @@ class Exposure {
     /// gradient stays for the step of this place in the batch.
     void record_backward(Commands& commands, const ExposedPicture& picture, const Buffer& d_image,
                          const ExposureStep& step, int place = 0);
-    /// The photo's Adam step of what record_backward left. status: gpu::FrameStatus of the frame.
+    /// Takes the photo's Adam step by the gradient that record_backward left. status:
+    /// gpu::FrameStatus of the frame.
     void record_step(Commands& commands, const Buffer& status, const ExposureStep& step,
                      int place = 0);
 
-    /// What record_backward left for this place, and as another process has it. The queue must be
-    /// idle.
+    /// The gradient that record_backward left for this place; set_gradient puts another process's
+    /// there. The queue must be idle.
     std::vector<float> gradient(int place) const;
     std::size_t gradient_floats() const;
     void set_gradient(int place, const std::vector<float>& values);
 
-    /// Of each photo; of a grid the mean of its maps.
+    /// One map per photo; where there is a grid, the mean of its maps.
     std::vector<ColourMap> maps() const;
     /// maps and moments as one array, for checkpoints: [photos][terms], [photos][terms][2].
     std::vector<float> state() const;
@@ -99,7 +100,7 @@ class Exposure {
 
     ExposureMaps of_;
     Pipeline map_, gradient_, backward_,
-        update_;  // backward_ of grids, of one map gradient_ is both
+        update_;  // backward_: for grids; for one map gradient_ does both
     Buffer maps_, moments_, mapped_, partials_;
 };
 

@@ -16,20 +16,20 @@ class IterateAverage {
     /// Holds no memory of splats before the first add().
     explicit IterateAverage(Device& device);
 
-    /// Takes in the splats as they are, of the count and degree of those before or after clear().
-    /// The queue must be idle. Throws Error where the device has no room for the first; to be
-    /// cleared then.
+    /// Adds the splats as they are now; their count and degree may change only after clear(). The
+    /// queue must be idle. Throws Error where the device has no room for the first mean; call
+    /// clear() then.
     void add(const GpuSplats& splats);
-    /// How many it is the mean of.
+    /// How many calls of add() the mean is over.
     std::uint32_t count() const { return count_; }
-    /// The parameters and their mean change places; a second time, back. Nothing where count() is
-    /// 0.
+    /// Swaps the parameters and their mean; a second call swaps them back. Does nothing where
+    /// count() is 0.
     void swap(GpuSplats& splats);
     void clear();
 
-    /// [attribute][N stride], or empty; with count() what a checkpoint holds.
+    /// [attribute][N stride], or empty; a checkpoint holds this and count().
     std::vector<std::vector<float>> state(const GpuSplats& splats) const;
-    /// splats: of the same count and degree.
+    /// splats: with the same count and degree.
     void restore(const std::vector<std::vector<float>>& state, std::uint32_t count,
                  const GpuSplats& splats);
 

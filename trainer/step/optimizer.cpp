@@ -6,7 +6,7 @@
 namespace darb {
 
 namespace {
-// In a trial, the rate of the bands above the first over that of the first.
+// Rate of the bands above the first in a trial, over that of the first.
 constexpr float kTrialRestRate = 0.2f;
 }  // namespace
 

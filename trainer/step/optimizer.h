@@ -11,18 +11,19 @@ namespace darb {
 
 class Optimizer {
   public:
-    /// extent, reach: scene_extent() and scene_reach(), world units. photos: trained on.
+    /// extent, reach: scene_extent() and scene_reach(), world units. photos: how many are trained
+    /// on.
     Optimizer(const TrainOptions& options, const Schedule& schedule, double extent, double reach,
               std::size_t photos);
 
-    /// The step of an iteration, from 1, or of the batch that it is the last of. Its clearance is
-    /// the view's, for the caller to set.
+    /// The step of an iteration, from 1, or of the batch that ends with it. The caller sets its
+    /// clearance, which depends on the view.
     AdamStep step(int iteration) const;
-    /// The same in a trial of a few iterations: all rates times `share`, and a step of all bands of
-    /// colour in each.
+    /// The same in a trial of a few iterations: all rates times `share`, and all bands of colour
+    /// take a step in each.
     AdamStep trial_step(int iteration, float share) const;
 
-    /// What multiplies lengths that options give for a Gaussian in shares of the scene extent.
+    /// Factor for lengths that options give for a Gaussian as shares of the scene extent.
     double length() const { return schedule_.length_scale * extent_; }
 
   private:

@@ -55,9 +55,9 @@ struct TrainingView {
 
 class TrainingPhotos {
   public:
-    /// photos: as load_photos gives them, in the order of dataset.views. origin: of the splats.
-    /// stream: they wait on the host. depths: those of the views that have any go with them.
-    /// Throws Error where no view is left to train on.
+    /// photos: as load_photos gives them, in the order of dataset.views. origin: that of the
+    /// splats. stream: the photos wait on the host. depths: measured depths go with the photos of
+    /// views that have any. Throws Error where no view is left to train on.
     TrainingPhotos(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
                    const glm::dvec3& origin, bool stream, bool depths = false);
 
@@ -70,12 +70,13 @@ class TrainingPhotos {
     /// waits, with that of the view `next` after it; -1: not known. Recordings are submitted in the
     /// order of these calls.
     const Buffer& place(Commands& commands, const TrainingView& view, int next = -1);
-    /// What was recorded last goes to the queue: else the next place() copies anew.
+    /// To be called once the last recording went to the queue; otherwise the next place() copies
+    /// again.
     void submitted() { pending_ = false; }
     bool stream() const { return memory_ == Memory::waiting; }
     /// The camera of a view at its whole size.
     const Camera& camera(int view) const { return view_cameras_[view]; }
-    /// Others in place of those of all views, of the same sizes. The queue must be idle.
+    /// Replaces the cameras of all views by others of the same sizes. The queue must be idle.
     void set_cameras(const std::vector<Camera>& cameras);
     /// The name of a view.
     const std::string& name(int view) const { return names_[view]; }
@@ -85,14 +86,14 @@ class TrainingPhotos {
     /// Median of the measured depths, world units; 1 where there are none.
     double usual_depth() const { return usual_depth_; }
 
-    int longest_side() const { return longest_side_; }       // px, of all views
-    int largest_width() const { return width_; }             // px, of all views
-    int largest_height() const { return height_; }           // px, of all views
-    std::uint64_t largest_photo() const { return pixels_; }  // pixels, of the training photos
+    int longest_side() const { return longest_side_; }       // px, over all views
+    int largest_width() const { return width_; }             // px, over all views
+    int largest_height() const { return height_; }           // px, over all views
+    std::uint64_t largest_photo() const { return pixels_; }  // pixels of the largest training photo
 
     /// The cameras of the training photos at their whole size, on the host.
     std::vector<gpu::CameraData> training_cameras() const;
-    /// Of the splats that the cameras see.
+    /// Origin of the splats that the cameras see (SplatModel::origin).
     const glm::dvec3& origin() const { return origin_; }
     /// The mean of their centres.
     glm::vec3 mean_centre() const;
@@ -104,7 +105,7 @@ class TrainingPhotos {
     /// idle.
     void set_divisor(int divisor);
     bool has_room_for_smaller() const { return room_for_smaller_; }
-    /// Of the smaller photos that are there now.
+    /// Pixels of all the smaller photos that are there now.
     std::uint64_t small_pixels() const;
     std::uint32_t small_cameras() const { return static_cast<std::uint32_t>(small_.data.size()); }
 
@@ -116,7 +117,7 @@ class TrainingPhotos {
     };
     struct Place {
         Buffer pixels;
-        int view = -1;  // whose photo is there, after all that was recorded
+        int view = -1;  // view whose photo is there once all that was recorded has run
     };
     void upload(const View& view, const ImageU8& photo, const ImageF& depth);
     void make_smaller(ResolutionRamp& ramp, int divisor);
@@ -132,7 +133,7 @@ class TrainingPhotos {
     double usual_depth_ = 1;
     int longest_side_ = 1, width_ = 1, height_ = 1;
     std::uint64_t pixels_ = 1;
-    Memory memory_;  // of the photos
+    Memory memory_;  // where the photos lie
     Size whole_, small_;
     std::array<Place, 2> places_;
     bool pending_ = false;  // recorded, and not yet submitted

@@ -15,8 +15,8 @@ namespace darb {
 /// What a probe found.
 struct ProbeResult {
     int iteration = 0, degree = 0;  // degree: the one on trial
-    // On the photos set aside; NaN where nothing was measured: too few photos or a degree above
-    // the first, which admits it, or no room for it within max_memory_bytes, which refuses it.
+    // Gain on the photos set aside. NaN where nothing was measured: with too few photos or a degree
+    // above the first it is admitted, without room for it within max_memory_bytes it is refused.
     double gain_db = 0;
     bool admitted = false;
 };
@@ -27,7 +27,7 @@ struct ProbeFork {
     std::function<void(const TrainerState& state)> restore;
     /// Trains iteration `iteration` on a view, all rates times `share`, nothing else.
     std::function<void(int iteration, int view, float share)> step;
-    /// dB, of the picture of a training view as it is now.
+    /// PSNR of the picture of a training view as it is now, dB.
     std::function<double(int view)> photo_psnr;
 };
 
@@ -38,7 +38,8 @@ class DegreeProbe {
   public:
     DegreeProbe(const TrainOptions& options, const Schedule& schedule);
 
-    /// Whether there is one after the step that this iteration ends, of splats of this degree.
+    /// Whether a probe is due after the step that ends with this iteration, for splats of this
+    /// degree.
     bool is_due(int iteration, int degree) const;
     /// Tries one more degree. state: the run's, which the fork ends away from; it gets the degree
     /// that won and the iteration of the next probe, for the caller to restore. views: the training
@@ -48,7 +49,7 @@ class DegreeProbe {
 
     const std::vector<ProbeResult>& results() const { return results_; }
     int next() const { return next_; }
-    /// 0: as it is.
+    /// 0 leaves it as it is.
     void set_next(int iteration) {
         if (iteration > 0) next_ = iteration;
     }

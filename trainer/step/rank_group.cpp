@@ -31,7 +31,8 @@ std::uint32_t checksum(const GpuSplats& splats) {
     return static_cast<std::uint32_t>(crc);
 }
 
-// Of an object in JSON what the other has not; other texts as they are.
+// Where both are JSON objects, the entries of `text` that `other` lacks or has otherwise; else
+// `text`.
 std::string what_differs(const std::string& text, const std::string& other) {
     const auto own = nlohmann::json::parse(text, nullptr, false);
     const auto its = nlohmann::json::parse(other, nullptr, false);
@@ -44,7 +45,7 @@ std::string what_differs(const std::string& text, const std::string& other) {
 
 }  // namespace
 
-RankFacts rank_facts() {  // of a version there are many builds
+RankFacts rank_facts() {  // hashes the program, as one version has many builds
     return {
         {"program", fmt::format("{} ({})", DARB_VERSION, fact_of(read_file("/proc/self/exe")))}};
 }

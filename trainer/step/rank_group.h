@@ -15,8 +15,8 @@ namespace darb {
 
 struct RankGroup {
     Ranks* all = nullptr;
-    /// Their devices may round differently: the first one's splats are taken over after each round
-    /// of density control, and in between, in place of the promise of equal bits.
+    /// Whether their devices may round differently. Then equal bits are not promised; instead all
+    /// take over the first one's splats, after each round of density control and in between.
     bool mixed = false;
 
     bool several() const { return all && all->count() > 1; }
@@ -25,15 +25,15 @@ struct RankGroup {
 /// Throws Error where the batch has no aligned parts of equal size for so many ranks.
 void check_batch(const Ranks& ranks, int batch);
 
-/// What a rank's run is, by what it is called.
+/// Facts about a rank's run, by name.
 using RankFacts = std::vector<std::pair<std::string, std::string>>;
 /// This program and build; with a device, also what decides how it rounds.
 RankFacts rank_facts();
 RankFacts rank_facts(const Device& device);
 /// A number that stands for a text or an array in facts.
 std::string fact_of(std::span<const std::byte> bytes);
-/// Throws Error that names each rank which has other facts than the first, and them. All ranks call
-/// it with facts of the same names.
+/// Throws Error that names each rank whose facts differ from the first one's, and these facts. All
+/// ranks call it with facts of the same names.
 void check_same(Ranks& ranks, const RankFacts& facts);
 
 /// Whether any rank is to stop. All ranks call it.

@@ -25,11 +25,12 @@ class SmoothingFilter {
 /// The filter of a run: it follows the splats as they move, come and go.
 class TrainedSmoothing {
   public:
-    /// cameras: of the training photos at their whole size.
+    /// cameras: those of the training photos at their whole size.
     TrainedSmoothing(Device& device, const ProjectionEffects& effects,
                      const std::vector<gpu::CameraData>& cameras);
 
-    /// After every step, of the iterations (begin, end]: whether the filter follows one of them.
+    /// To be called after every step, which was the iterations (begin, end]: notes whether the
+    /// filter has to follow one of them.
     void advance(int begin, int end);
     void mark_stale() { stale_ = true; }
     bool is_stale() const { return stale_; }
