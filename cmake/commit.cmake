@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Writes OUT, a C++ file with the commit of SOURCE; only where it changed, so that nothing is
 # compiled again in vain. Run at every build: cmake -DSOURCE=... -DOUT=... -P commit.cmake
 execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --exclude=*

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Run by the build: -DROOT=..., -DOUT=...: the names of the specialization constants that the shaders declare, for
 # engine/gpu/constant_name.h.
 cmake_policy(VERSION 3.22)

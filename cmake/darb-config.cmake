@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # find_package(darb): the target darb::darb, and what it needs.
 include(CMakeFindDependencyMacro)
 find_dependency(Vulkan)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Run at build time: cmake -DOUT=FILE.cpp -DROOT=DIR -DFILES=a,b,c -P embed.cmake writes FILE.cpp, which holds the files
 # (paths below DIR) as text, by name. engine/publish/page_files.h reads them.
 string(REPLACE "," ";" names "${FILES}")

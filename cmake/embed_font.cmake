@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Run at build time: cmake -DOUT=FILE.cpp -DFONT=FILE.ttf -P embed_font.cmake writes FILE.cpp, which holds the font;
 # none where the file is not there. viewer/gui_font.h reads it.
 set(bytes "")

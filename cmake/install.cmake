@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # cmake --install: the command, and the library as the CMake package darb. find_package(darb) gives darb::darb, all of
 # engine/ and trainer/; add_subdirectory gives the same. docs/library.md shows how it is used.
 include(GNUInstallDirs)

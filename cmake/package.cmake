@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # cpack: the Debian packages darb (the command) and libdarb-dev (the library); tools/package.sh runs it.
 # python3-darb is made by tools/package_python.sh.
 set(CPACK_GENERATOR DEB)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # The page's own sources, and the shaders that it shares with darb.
 file(GLOB page_files CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}
   ${PROJECT_SOURCE_DIR}/engine/publish/page/* ${PROJECT_SOURCE_DIR}/shaders/shared/*.h

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # -DDARB_PORTABLE=ON: the command for any Linux on amd64 with glibc 2.31 or later. tools/package.sh names static
 # libraries for all but the Vulkan loader, which it puts into lib/darb beside bin.
 set(old_glibc ${PROJECT_SOURCE_DIR}/tools/portable/old_glibc.c)

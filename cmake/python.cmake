@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Whether the Python module is built: DARB_PYTHON is OFF, ON, or AUTO, which builds it where what it takes is found.
 # DARB_WITH_PYTHON is the answer. Libraries are compiled for it, so that it is found out before them.
 set(DARB_WITH_PYTHON OFF)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # darb_compile_shaders(TARGET FOLDER): compiles every FOLDER/*/*.comp to SPIR-V and embeds it.
 # The result is a static library with one table, darb::shader_table(), name -> SPIR-V words; the
 # name is the file's stem. Specialization constants stay open until pipeline creation.

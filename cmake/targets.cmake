@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # darb_linked_anywhere(TARGETS...): static libraries that a shared one may take in, as the Python module does.
 # Nothing of them can be put in the place of, so that functions are called as in a program. Without the
 # module they are compiled as for programs.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Draws a splat file from one side and writes a PNG.
 //
 //     render_scene SCENE PICTURE.png [DEVICE]

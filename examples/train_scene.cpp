@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Trains a scene, measures it on photos that were held out, and writes it as a PLY file.
 //
 //     train_scene DATASET SCENE.ply [ITERATIONS]      default: 300

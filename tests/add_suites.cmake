@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Run by ctest at its start, for an executable of many files: a test for each suite (TEST(suite, case)), whose cases
 # share pipelines, which take longer to make than they run. EXECUTABLE.SUITE is its name; cases whose own names end in
 # _slow or _long are tests beside it, EXECUTABLE.SUITE_slow and EXECUTABLE.SUITE_long. Wants EXECUTABLE, KIND and

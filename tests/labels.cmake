@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # The labels of tests, by which tools/test.sh chooses them: the kind (unit, shader, pipeline, training or python); the
 # step that runs the test (unit, sync, gpu, long or python; sync is under Vulkan's validation, gpu is not); and
 # `sanitized` for what runs under ASan and UBSan, too. The last part of a name says how long it takes: _slow or _long.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Headless Chromium over its debugging pipe, with what a page says and asks for. Standard library only.
 
 Used by tools/page_check.py; it does nothing by itself.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Checks every include of the project's own files against the arrows of ARCHITECTURE.md.
 
     check_includes.py [ROOT]

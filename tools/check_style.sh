@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Include arrows and layout of every source file, and the links of every page; prints each violation.
 #   tools/check_style.sh [--fix | --tidy] [ROOT]
 #     --fix    let clang-format rewrite the files
 #     --tidy   clang-tidy instead, on every source file (it takes minutes); .clang-tidy has its checks
 set -uo pipefail
-case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
 fix=0 tidy=0
 [[ ${1:-} == --fix ]] && { fix=1; shift; }
@@ -27,7 +28,7 @@ fi
 
 python3 "$here/check_includes.py" . || failed=1
 python3 "$here/links.py" --root . || failed=1
-# python3 "$here/spdx.py" --root . --check || failed=1    # to be enabled once tools/spdx.py has written the lines
+python3 "$here/spdx.py" --root . --check || failed=1
 
 folders=()
 for folder in engine trainer viewer tools examples tests shaders; do

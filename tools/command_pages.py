@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Man pages, and completion for bash, zsh and fish, from the option tables of a built darb.
 
   tools/command_pages.py DARB OUT    writes OUT/man1/darb*.1.gz, OUT/bash/darb, OUT/zsh/_darb, OUT/fish/darb.fish

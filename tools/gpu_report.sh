@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Measures darb on this machine's GPU and leaves one folder with one page that can be attached to a report.
 #   tools/gpu_report.sh [-o FOLDER] [--darb PATH] [--device NAME] [--photos DATASET] [--minutes N]
 #
@@ -14,7 +15,7 @@
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 out=gpu_report darb= device=() photos= minutes=10
-usage() { sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; }
 while (($#)); do
     case $1 in
         -h | --help) usage; exit 0 ;;

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Finds links in the Markdown pages that lead nowhere: to a file that is not there, or to a heading that is not there.
 
     tools/links.py [--root DIR]      prints each dead link with its page and line; exit code 1 if there is one

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # The packages of darb, for amd64. Run it on Debian 12, as the portable archive takes its libraries from there.
 #   tools/package.sh [OUT] [deb | portable]...      default: OUT is build-portable/out; both
 #     deb        OUT/darb_VERSION_amd64.deb and OUT/libdarb-dev_VERSION_amd64.deb
@@ -6,7 +7,7 @@
 # The archive's libraries are linked statically. Debian has some as shared ones alone: these are built from its source
 # packages, and the Vulkan loader lies beside the command. tools/package_test.sh installs both in bare systems.
 set -euo pipefail
-case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 
 out=build-portable/out

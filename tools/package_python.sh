@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # The Debian package python3-darb of a build with the Python module.
 #   tools/package_python.sh BUILD OUT      writes OUT/python3-darb_VERSION_ARCH.deb
 # Holds what `cmake --install BUILD --component python` installs below /usr, compiled when it is installed.
 set -euo pipefail
 case ${1:-} in
-    -h | --help | "") sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help | "") sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;;
 esac
 build=$1 out=$2
 for tool in dpkg-deb dpkg-shlibdeps; do

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Installs the packages of darb in bare systems and trains 50 iterations there; needs root and debootstrap.
 #   tools/package_test.sh PACKAGES [deb | dev | portable | new | old]...    PACKAGES: what tools/package.sh wrote; default: all
 #     deb       darb_*.deb by apt in a bare Debian 12
@@ -8,7 +9,7 @@
 #     old       the archive in a bare Debian 11, glibc 2.31: it starts, computes and says that there is no device. It does not
 #               train there, as Debian 11's Mesa has no Vulkan 1.3
 set -euo pipefail
-case ${1:-} in -h | --help | "") sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+case ${1:-} in -h | --help | "") sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 packages=$(cd "$1" && pwd)
 shift
 source=$(cd "$(dirname "$0")/.." && pwd)

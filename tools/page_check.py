@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Holds web pages in headless Chromium (software GL) against `darb render`.
 
     tools/page_check.py SCENE... [options]      a table: bytes, seconds to the first picture, frames a second, dB

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Installs the distribution packages that darb is built and tested with (Debian 12, Ubuntu 24.04).
 # Needs root or sudo only when something is missing; a second run returns at once.
 set -euo pipefail

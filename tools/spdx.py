@@ -31,8 +31,10 @@ def comment_of(path):
 
 def sources(root):
     listed = subprocess.run(["git", "-C", root, "ls-files", "-z", "--", *FOLDERS, "CMakeLists.txt"],
-                            check=True, capture_output=True, text=True).stdout
-    return [path for path in listed.split("\0") if path and comment_of(path)]
+                            check=False, capture_output=True, text=True)
+    if listed.returncode != 0:  # an unpacked archive
+        return []
+    return [path for path in listed.stdout.split("\0") if path and comment_of(path)]
 
 
 def with_line(text, comment):

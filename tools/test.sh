@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Sets up, builds and runs the checks of the project. tests/labels.cmake says which tests a step has. Ends with what
 # failed, then "N passed, N failed": cases of tests, and one for each other step.
 set -uo pipefail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bounds: the sphere that "frame all" shows.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/camera_path.h"
 
 #include <fmt/format.h>

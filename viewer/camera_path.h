@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // CameraPath: key frames that a camera flies through smoothly. Position and the logarithm of
 // tan(fov / 2) are cubic Hermite curves through the keys, tangents by finite differences over time
 // (Catmull-Rom where the times are even); orientation is the same curve on quaternions of one

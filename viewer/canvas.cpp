@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/canvas.h"
 
 #include "engine/core/error.h"

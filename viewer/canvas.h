@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Canvas: the image of a window's whole content, the scene's picture with the panels drawn over
 // it; then given to a swapchain or read back. Needs a queue with graphics.
 //

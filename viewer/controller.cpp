@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/controller.h"
 
 #include <fmt/format.h>

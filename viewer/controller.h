@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Controller: what was asked. Keys, the pointer and its tools act on the document at once; what
 // they, the panels and the window request is done by the document and the painter, in order.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What keys and the pointer do: with the camera at once, with everything else as requests.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // DisplaySettings: how a scene is shown, as the panels edit it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is shown: a file that was loaded, or a training run; how each is meant to be shown, and what
 // of it is written to files.
 #include "viewer/document.h"

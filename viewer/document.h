@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Document: what is shown. The scene with its edits and their history, the cameras that look at it,
 // the training run that is followed; how each is meant to be shown, and what of it is in files. It
 // draws nothing.

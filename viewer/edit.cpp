@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/edit.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Edit: what was done to a scene since it was opened, step by step, with undo and redo: splats
 // selected, hidden, deleted, moved, and scenes merged into it. Marks lie beside the model; moves
 // and merges change the model, which the caller keeps and hands over, always the same.

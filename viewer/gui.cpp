@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/gui.h"
 
 #include <imgui.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gui: Dear ImGui on a device, with or without a window.
 #pragma once
 

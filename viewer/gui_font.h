@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The letters of the panels: Roboto, as the build found it in Debian's fonts-roboto-unhinted.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Input: what mouse and keys did since the last frame, free of any window system.
 #pragma once
 

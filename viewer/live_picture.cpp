@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/live_picture.h"
 
 #include <algorithm>

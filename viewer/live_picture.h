@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pictures of a training run in a window of another thread. The window says what it wants to see;
 // the run draws that on its own device between two iterations and hands the pixels over. So what
 // holds the run up for seconds (compiling, a probe, an evaluation) leaves the window alive: it

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/navigation.h"
 
 #include <algorithm>

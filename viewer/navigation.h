@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Navigation: where a viewer's camera is and how mouse and keys move it. Pure mathematics, no
 // window. The frame is that of Camera: x right, y down, z forward.
 #pragma once

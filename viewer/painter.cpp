@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The pictures of a scene, each frame's as its pacing wants it, and what they cost.
 #include "viewer/painter.h"
 

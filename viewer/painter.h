@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Painter: how it is painted. Pictures of the scene, whole ones and those in motion, the panels
 // over them, and the canvas that takes both; what it needs of the device, and when it draws.
 //

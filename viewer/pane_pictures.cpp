@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/pane_pictures.h"
 
 #include <algorithm>

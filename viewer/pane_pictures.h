@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PanePictures: the pictures of panes, the photo's among them, and the strips of them that a window
 // shows. Moving a line draws no splats.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Panes: pictures of one scene side by side in strips of the window, the photo first where it is
 // compared, then a kernel each; between them lines that can be dragged.
 #pragma once

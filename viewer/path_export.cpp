@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/path_export.h"
 
 #include <fcntl.h>

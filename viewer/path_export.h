@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PathExport: a camera path as numbered PNG frames, one frame a call so that a window stays alive,
 // and then a video where ffmpeg is installed.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/photo_compare.h"
 
 #include <algorithm>

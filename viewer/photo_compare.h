@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cameras of a data set, the one that is looked through, and its photo beside the picture.
 #pragma once
 

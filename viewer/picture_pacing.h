@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PicturePacing: which picture a frame draws. In motion a lesser one, so that the frame rate keeps;
 // the whole one a moment after the last change, in two steps where it takes long; nothing while
 // nothing changes. It knows no device: who draws says what was drawn.

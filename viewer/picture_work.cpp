@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/picture_work.h"
 
 #include <fmt/format.h>

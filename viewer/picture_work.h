@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PictureWork: what draws pictures of its own while the window lives, one a frame: the export of a
 // camera path, and the measurement of settings and effects. Each may run beside the other.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/saved_files.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // SavedFiles: which files the viewer may write over. Those that it wrote itself, and others when it
 // is asked a second time.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scene: a splat file in memory, and the job that loads one in the background.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Seconds of the clock that the viewer paces itself by.
 #pragma once
 

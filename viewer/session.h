@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Session: everything that the panels show and edit, in three parts. Panels change it and ask, the
 // viewer acts.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/splat_picture.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // SplatPicture: a scene on the device and 8-bit pictures of it, in any display mode. It wraps the
 // engine's Forward, which it builds anew when kernel, footprint or what a mode needs changes.
 //

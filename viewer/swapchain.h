@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Swapchain: gives a canvas to a window's surface.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The switches whose time and error the viewer measures: presets, accuracy settings and effects, as
 // rows of one table, each with its choices.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/tools.h"
 
 #include <algorithm>

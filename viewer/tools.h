@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Tools: what the left button does to the splats while one is chosen. A stroke selects, a gizmo
 // moves, turns and scales what is selected.
 #pragma once

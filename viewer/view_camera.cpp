@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/view_camera.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cameras for a window: a photo's camera fitted into it, and which splat is under the pointer.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Viewer: a scene, its camera and its panels, drawn into a canvas; with a window or without one. It
 // has three parts: what is shown (Document), how it is painted (Painter), what was asked
 // (Controller).

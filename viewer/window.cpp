@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #define GLFW_INCLUDE_VULKAN
 #include "viewer/window.h"
 

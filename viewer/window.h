@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // ViewerWindow: a GLFW window around a Viewer. Frames are drawn when there is something new: input,
 // a finished load, a picture to refine; in between the process sleeps.
 #pragma once

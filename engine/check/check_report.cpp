@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/check/check_report.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What `darb check` finds: one row per quantity, with its worst error and its tolerance.
 #pragma once
 

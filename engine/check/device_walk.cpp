@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/check/device_walk.h"
 
 #include "engine/core/rng.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One forward and backward pass of a scene on the device, read back: the device's version of the
 // walk that engine/reference computes in double.
 #pragma once

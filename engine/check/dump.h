@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One view of a scene as arrays: the image, and the gradient of a fixed loss by every parameter
 // that a PLY file stores, for comparison with any other implementation.
 #pragma once

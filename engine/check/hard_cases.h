@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The hard cases: scenes that are known to break renderers of splats, each with what goes wrong
 // elsewhere.
 #pragma once

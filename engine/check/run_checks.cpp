@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/check/run_checks.h"
 
 #include <algorithm>

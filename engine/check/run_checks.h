@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every numerical check of a device and its driver against double: kernels, scan, sort, loss, the
 // whole walk forward and back, and the hard cases.
 #pragma once

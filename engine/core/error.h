@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Error: bad input, or a device that cannot go on. It may be thrown anywhere and is caught once, in
 // main, which prints "error: WHERE: WHAT" and "  WHAT TO DO" and exits with status 2. Code that has
 // a fallback catches one of the narrower kinds below instead. Also here: DARB_CHECK, for bugs, and

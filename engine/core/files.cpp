@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/core/files.h"
 
 #include <fcntl.h>

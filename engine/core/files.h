@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Files: reading them whole, and writing them so that either the old file or the new one remains,
 // never half of one.
 #pragma once

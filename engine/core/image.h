@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Image<T>: row-major, interleaved channels, top row first. data[(y * width + x) * channels + c].
 #pragma once
 

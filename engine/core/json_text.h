@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Says what is wrong with a text that should be JSON, by line and column and in words for users:
 // the library's own messages are meant for its callers.
 #pragma once

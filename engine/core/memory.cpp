@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/core/memory.h"
 
 #ifdef __GLIBC__

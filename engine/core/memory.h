@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How much memory the machine has left, and how to hand freed memory back to it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Work on several threads, or on as many as the system will start.
 #pragma once
 

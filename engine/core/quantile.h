@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Quantiles and medians.
 #pragma once
 

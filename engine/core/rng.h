@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pcg32 (O'Neill 2014, XSH-RR 64/32): small, seedable, and with equal numbers on every platform.
 #pragma once
 

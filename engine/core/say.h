@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Printing. Progress goes to stderr with say(), where a closed or full stderr is no reason to stop.
 // Results that the user asked for go to stdout with tell(), where a full disk is an error but a
 // reader that has gone away is not.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // ScopeGuard: restores something at the end of a scope, however the scope ends.
 //
 //     const Tuning before = device.tuning();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Non-temporal writes, for memory that this processor will not read again soon, such as mapped
 // device buffers. A cache line is not read before it is written, and the caches keep what they
 // hold. On processors without such writes, these are ordinary ones.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Text in files, on the command line and on terminals: treated as ASCII whatever the locale.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/core/user_folders.h"
 
 #include <cstdlib>

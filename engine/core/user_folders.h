@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Folders of the user that outlive a command, as the environment names them (XDG Base Directory
 // Specification; relative names do not count).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // ByteReader: reads little-endian binary data with bounds checks.
 #pragma once
 

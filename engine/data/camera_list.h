@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // cameras.json, as 3DGS writes it beside a scene, and cameras from any file or folder a user names.
 #pragma once
 

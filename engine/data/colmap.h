@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // COLMAP models, binary and text, as the files state them. Format: colmap.github.io/format.html.
 // Every function throws Error(where and record, reason), and allocates no more than the size of the
 // file justifies.

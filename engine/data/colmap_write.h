@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Writes a small COLMAP model: cameras.bin, images.bin and points3D.bin, as COLMAP and common
 // trainers read them. Used by scene generators and tests.
 #pragma once

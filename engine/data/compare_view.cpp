@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/compare_view.h"
 
 #include <algorithm>

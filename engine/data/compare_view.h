@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Compares a rendered view with its photo: both composited, quantised to 8 bits, and measured.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/dataset.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Dataset: photos with their cameras and the sparse points, from any of the supported sources.
 // Cameras are pinholes in the frame of engine/scene/camera.h, at the size the photos load with.
 // With DatasetOptions::original_lens or original_where_wide, the cameras of distorted photos

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/depth_io.h"
 
 #include <fmt/format.h>

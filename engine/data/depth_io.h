@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Depth images: written as 16-bit grey PNG; read from PNG, .npy and TIFF.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/depths.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Depths that were measured along with the photos (by LiDAR or depth cameras): finding the files,
 // and mapping them to the cameras of the views.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/hold_out.h"
 
 #include <fmt/format.h>

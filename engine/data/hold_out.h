@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // HoldOut: which views of a data set are held out, as --hold-out states it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PNG and JPEG files: reading size and orientation without decoding, decoding, and encoding.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/lens_model.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Lens: the camera models of COLMAP 3.8, and the equidistant ones of later versions, as one
 // function of a ray and its inverse.
 // Every model is a pinhole after a distortion of the plane z = 1,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Masks beside the photos, by the names that COLMAP, RealityCapture and people give them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/metrics.h"
 #include "engine/core/on_threads.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PSNR and SSIM on the CPU, as papers on splatting report them.
 #pragma once
 

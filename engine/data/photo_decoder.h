@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the decoders of PNG and JPEG share: the size that a file claims is checked before
 // anything of that size is allocated. Photos come from strangers, so the decoding itself is left to
 // libpng and libjpeg-turbo, which the distribution maintains.

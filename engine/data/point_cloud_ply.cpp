@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/point_cloud_ply.h"
 
 #include <fmt/format.h>

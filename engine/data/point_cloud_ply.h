@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Point clouds as PLY: x y z and red green blue, as in points3D.ply and nerfstudio's sparse_pc.ply.
 #pragma once
 

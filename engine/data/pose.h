@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Poses as files state them, checked on the way in.
 #pragma once
 

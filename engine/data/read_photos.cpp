@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Photos: decode, mask, undistort, scale; many at once.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where the cameras of a data set look.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pixel operations that turn a decoded photo into a training photo, all on RGBA with straight
 // alpha.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From a folder of photos to a data set: runs the installed colmap on the CPU, without a display.
 #pragma once
 

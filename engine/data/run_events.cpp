@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/run_events.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reads the run.jsonl and metrics.json of a run again, for --resume and for comparisons. Content
 // that no run writes is an input error.
 #pragma once

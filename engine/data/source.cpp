@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/source.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the readers of sources share with load_dataset. Internal to engine/data.
 #pragma once
 

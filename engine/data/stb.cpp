@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The only translation unit with the code of stb_image_write. Pictures are read by other libraries:
 // see photo_decoder.h.
 #pragma GCC diagnostic ignored "-Wconversion"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/track_adjustment.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bundle adjustment: refines poses and points from the tracks alone, without looking at pixels.
 // Where cameras do not come from these tracks, or were changed since, it recovers what the tracks
 // say.

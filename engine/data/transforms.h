@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // transforms.json as the file states it: NeRF synthetic, instant-ngp and nerfstudio. Accesses no
 // files. Keys that would change the meaning but are not supported become notes.
 #pragma once

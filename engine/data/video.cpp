@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/video.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Photos from a video: the installed ffmpeg decodes it, and the sharpest picture of each interval
 // is kept.
 #pragma once

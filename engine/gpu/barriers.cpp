@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/gpu/barriers.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // BarrierTracker: which buffers were written and read by what, and the memory barrier that the next
 // pass needs. One barrier orders everything before it, not a buffer alone: so drivers carry out
 // barriers of buffers, too, and passes that share nothing may then run side by side. Whole buffers

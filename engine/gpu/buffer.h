@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Buffer: a move-only owner of device memory, usable as storage, indirect and transfer buffer.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Lists of buffers: which members of an object are buffers, how they are called and how many bytes
 // each takes. The object makes its buffers from the list and a plan of memory adds the same list
 // up, so that the two cannot differ.

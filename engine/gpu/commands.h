@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Commands: records passes one statement each, with barriers derived from what each pass reads and
 // writes, and runs them. Each pass() is a debug label and a pair of timestamps.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Names of specialization constants. The build collects them from the shaders, so that a misspelt
 // one does not compile.
 #pragma once

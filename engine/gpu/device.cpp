@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/gpu/device.h"
 
 #include <fmt/format.h>

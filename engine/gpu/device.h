@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Device: one Vulkan 1.3 device with one compute queue, no window system needed. engine/gpu knows
 // buffers, pipelines and commands; nothing of splats. What the environment asks for (validation,
 // faults, tuning) is read by commands and tests and handed down in options.

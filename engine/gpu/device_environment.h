@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The device of a command: what --device says, and the environment: DARB_VALIDATION=1 turns the
 // validation layers on, DARB_FAULT injects faults for tests (engine/gpu/faults.h), compiled shaders
 // are kept in the user's cache folder.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/gpu/device_image.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // DeviceImage: a two-dimensional colour image of the device, with its memory, its view where it is
 // drawn to, and the layout that it is in, which Commands changes.
 #pragma once

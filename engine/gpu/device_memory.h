@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Memory of buffers and images: which type of the device's they get, and the blocks that small ones
 // share, as some drivers allow 4,096 allocations at once. Private to engine/gpu.
 #pragma once

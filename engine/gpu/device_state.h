@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What Buffer, Pipeline and Commands share of a Device. Private to engine/gpu.
 #pragma once
 

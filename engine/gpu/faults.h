@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Faults injected for tests, as text a comma-separated list (the command reads it from DARB_FAULT):
 //   oom:NAME   creating the buffer NAME fails as if the device were out of memory
 //   lost:N     the N-th submit of the device (from 1) and all later ones report a lost device;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pipeline: one compute shader of the table with its specialization constants set by name.
 #pragma once
 

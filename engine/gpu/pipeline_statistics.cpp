@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/gpu/pipeline_statistics.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a device's compiler says of the passes that it compiled: registers, spills, occupancy and
 // whatever else it counts (VK_KHR_pipeline_executable_properties). Place:
 // DeviceOptions::compile_only collects them; `darb devices --passes` prints them.

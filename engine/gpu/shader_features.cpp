@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/gpu/shader_features.h"
 
 #include <fmt/format.h>

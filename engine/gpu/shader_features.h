@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the shaders of the table need of a device, read from the capabilities of their SPIR-V: so
 // that a device is asked for no more, and one that is refused learns which shader it fails. Private
 // to engine/gpu.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/gpu/spirv_reflect.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a SPIR-V compute module says about its interface: a reader for the modules that glslang
 // writes with names kept (no -s, no stripping). Private to engine/gpu.
 #pragma once

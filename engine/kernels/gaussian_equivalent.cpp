@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // With area element dq (up to pi), I = integral w e^(-q/2c) dq and J = integral w q e^(-q/2c) dq:
 //   |w - a e^(-q/2c)|^2 = integral w^2 - 2 a I + a^2 c, least over c where a c^2 = J, and over both
 // where a = I/c, so c I = J.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The Gaussian nearest to a kernel, for viewers that know only Gaussians.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/kernels/kernel_coefficients.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The short polynomials that the shaders evaluate in float32, fitted in double to DerivedKernel.
 // evaluate() is the CPU twin of shaders/kernels/*.glsl, in float or double.
 #pragma once

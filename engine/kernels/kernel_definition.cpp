@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/kernels/kernel_definition.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A kernel as data: its profile w(q), given by a function, an expression or a table, and reduced to
 // a short Chebyshev series that files can hold. register_kernel (kernel_registry.h) adds it to the
 // family of kernels.

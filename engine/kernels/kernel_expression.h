@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels as text: "expr: (1 - q/9)^3, support 9, name cubic". Expressions are those of muParser,
 // in q = d^2 and d, with pi. A build without that library refuses them and says so.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The family of reconstruction kernels in double: the one place that defines a kernel's maths. q =
 // d^2 is the squared Mahalanobis distance of a pixel centre under the projected covariance. Source:
 // DARB-Splatting, arXiv 2501.12369, corrected (errata in docs/paper.md).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels in JSON files: {"name": ..., "support": ..., "expression": ...} or "table": [[q, w], ...]
 // or "function": ..., or a list of these. "function" is what darb writes: a kernel in digested
 // form, which needs neither expression nor table.

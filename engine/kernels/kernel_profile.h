@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One row per kernel: its name, its profile in double, its support and the order of its edge.
 // Everything else (slope, reach, psi, exact footprint, radial density, shader coefficients) is
 // derived from the row by DerivedKernel and kernel_coefficients.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels beyond the list that shaders know. A registered kernel has an id like the others, from
 // KERNEL_ROWS on, which kernel_family.h, kernel_coefficients.h and everything else that takes a
 // kernel accept. Ids are valid within one process; files store the definition.

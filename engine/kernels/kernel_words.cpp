@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/kernels/kernel_words.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels as people write them: a name, an expression, a file of their own.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gauss-Legendre quadrature for analytic integrands over [0, 1], especially even ones.
 #pragma once
 

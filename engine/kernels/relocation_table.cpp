@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/kernels/relocation_table.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a splat becomes when N splats take its place without changing the picture: the relocation of
 // 3DGS-MCMC (arXiv 2404.09591, eq. 9) for any kernel.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/kernels/second_moment.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How wide a kernel is in pictures, which merging needs to preserve the spread of splats.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/kernels/shaped_kernel.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels whose shape differs from splat to splat. Each is one row of a table: a class with
 // everything particular to it, in closed form where other kernels have fits and tables. A splat is
 // drawn with an exponent, which is a function of its attribute `shape`; shape 0, where training

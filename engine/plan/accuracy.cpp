@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/plan/accuracy.h"
 
 #include <fmt/format.h>

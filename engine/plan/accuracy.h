@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The accuracy settings: what a picture, or a training step, may trade for time. One table names
 // them, their choices and the presets; flags, help, JSON and the rows of `darb cost` follow it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/plan/antialias_probe.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // AntialiasProbe: what anti-aliasing gained in a trial, at the size that was trained on and at
 // others, and what a plan makes of it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // EffectPlan: which effects of shaders/shared/effect_list.h a scene or a data set calls for, each
 // with the number that was measured on it. What is off is not compiled, not stored, not computed.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How near each pass is to what the device can do: two rates measured at start, and the bytes and
 // operations of each pass, estimated from counts. The one place where these estimates stand.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/plan/tuner.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tuner: measures the choices of a device's tuning (tuning_names.h) on a small made-up
 // scene, and keeps what it found in a file beside the pipeline cache, once for each device, driver,
 // subgroup size and set of shaders.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/plan/tuning_names.h"
 
 #include <fmt/format.h>

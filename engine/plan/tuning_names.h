@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The names of a Tuning: what --tune, DARB_TUNE, checkpoints and records say, and what a device
 // allows of it.
 #pragma once

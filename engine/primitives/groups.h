@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How many workgroups a pass over `count` items takes, in two dimensions where one does not
 // suffice; shaders/lib/linear_id.glsl is the shader side.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/primitives/radix_sort.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // RadixSort: stable sort of (uint32 key, uint32 value) pairs on the device, least significant digit
 // first, with up to 8 bits per pass; each pass is histogram -> offsets -> scatter. It assumes no
 // forward progress between workgroups and no subgroup size. A stable sort has only one result, so

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/primitives/scan.h"
 
 #include <fmt/format.h>

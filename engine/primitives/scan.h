@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scan: exclusive prefix sum of uint32 on the device, reduce-then-scan in four dispatches (prepare,
 // reduce, top, apply; after Merrill and Grimshaw 2009). It assumes no forward progress between
 // workgroups and no subgroup size, and the result never depends on timing.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/publish/device_clusters.h"
 
 #include <algorithm>

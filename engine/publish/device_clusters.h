@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Finds the nearest centres for cluster_rows (engine/scene/cluster_rows.h) on a device.
 #pragma once
 

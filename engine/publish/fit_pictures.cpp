@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/publish/fit_pictures.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How coarsely a scene may be written: the search that web pages and `darb convert` share.
 // Pictures of the source decide: it takes the coarsest precision at which the worst of 8 views
 // keeps 50 dB.

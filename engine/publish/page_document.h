@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Assembles the document of a web page from its parts: text, script, shaders, splats.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/publish/page_files.h"
 
 #include "engine/core/error.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The sources of the web page, and the shaders that it shares with darb, embedded at build time by
 // cmake/embed.cmake.
 #pragma once

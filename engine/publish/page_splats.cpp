@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/publish/page_splats.h"
 
 #include <zlib.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/publish/web_page.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A scene as one HTML file that draws what darb draws. It contains splats, renderer and cameras,
 // and fetches nothing. docs/publish.md is its guide.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Ranks over MPI. All MPI calls go through one lock, so that MPI_THREAD_SERIALIZED suffices.
 // Waiting ranks poll and sleep in between, so that they take no core from their neighbours. A
 // thread of each rank reports every second that its process is alive: a rank that computes for

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Ranks where the program was built without MPI.
 #include <fmt/format.h>
 

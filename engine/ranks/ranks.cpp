@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/ranks/ranks.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Ranks: processes that work on one job together, started by mpirun or Slurm, and what they send
 // each other. One interface serves builds with MPI and without (mpi.cpp, no_mpi.cpp). Nothing here
 // adds numbers: the order of a sum is its caller's choice.

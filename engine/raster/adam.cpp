@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/adam.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What one step of the optimiser takes: Adam's rates of each attribute and what is beside Adam.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/attribute_rows.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How the rows of an attribute lie in a buffer of the device: row by row, as in SplatModel, but
 // those of each coefficient in blocks of ROW_BLOCK splats, in each a column of as many vec4 after
 // the other, so that neighbouring threads read neighbouring words (shaders/lib/rows.glsl).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/backward.h"
 
 #include <fmt/format.h>

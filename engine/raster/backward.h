@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Backward: from dL/dimage to the splats' parameters, recorded after Forward::record of the same
 // frame. blend_backward -> project_backward, which ends in the Adam step or in buffers of
 // gradients.

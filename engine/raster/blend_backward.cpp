@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/blend_backward.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // BlendBackward: from dL/dimage to sums over pixels for each intersection, by the method that
 // the device's tuning says; recorded after Forward::record of the same frame.
 #pragma once

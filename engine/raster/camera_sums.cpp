@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/camera_sums.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // CameraSums: dL/d(camera) of a view, added up over its splats on the device: what a step of a
 // camera is made of. Backward::record_gradients leaves the splats' shares here.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/forward.h"
 
 #include <fmt/format.h>

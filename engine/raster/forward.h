@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Forward: the pipelines from splats to an image, recorded top to bottom:
 // project -> scan -> compact -> depth sort -> scan -> emit -> tile sort -> ranges -> blend.
 // It holds no memory of a frame: that is the Frame that it is given.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // ForwardOptions: what is fixed when the passes of a frame are compiled, each a specialization
 // constant.
 #pragma once

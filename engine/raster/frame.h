@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Frame: the device memory of one frame, plain structs of buffers. Forward writes them, Backward
 // and whoever shows a frame read them, FrameBuffers makes them and lets them grow. An intersection
 // is a splat in a tile; N splats, K intersections, T tiles, H x W pixels.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // FrameBuffers: owns the memory of a frame and decides how it grows. Nothing is read back inside a
 // frame: one that needs more than there is raises a flag, the buffers grow, and it is done again.
 #pragma once

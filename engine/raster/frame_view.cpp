@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/frame_view.h"
 
 #include <fmt/format.h>

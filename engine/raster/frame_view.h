@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // FrameView: what a frame is drawn of, as the passes read it.
 #pragma once
 

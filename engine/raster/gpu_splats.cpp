@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/gpu_splats.h"
 
 #include <algorithm>

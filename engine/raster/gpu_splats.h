@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // GpuSplats: the parameters of N splats in device memory, one buffer an attribute, in the layout of
 // attribute_rows.h; with the optimiser's moments beside them where they are trained.
 #pragma once

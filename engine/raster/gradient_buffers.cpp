@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/gradient_buffers.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // GradientBuffers: dL/d(every attribute) of N splats in device memory, of one view or added over
 // several, and what the views showed of each splat. Backward fills them, callers may, too;
 // AdamUpdate makes a step of them. Sums of floats depend on their order: whoever adds several

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/kernel_constants.h"
 
 #include <fmt/format.h>

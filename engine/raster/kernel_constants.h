@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The specialization constants of shaders/kernels/kernel.glsl for one kernel.
 #pragma once
 

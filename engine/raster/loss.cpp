@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/raster/loss.h"
 
 #include <fmt/format.h>

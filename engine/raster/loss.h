@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Loss: (1 - lambda) L1 + lambda (1 - SSIM) of a rendered image against a photo, and its gradient,
 // in one pass over the image (shaders/loss/loss.comp), or in two by tiles, as the device's tuning
 // says, and one over the partial sums.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/reference/adam.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Adam (Kingma and Ba 2015) as PyTorch computes it, dense: every parameter moves every step.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Blending of one tile, front to back, and its gradient, back to front. Per pixel: alpha =
 // min(0.99, opacity w(q)), skipped below the cut-off; C += T alpha colour; T *= 1 - alpha; stop
 // before T would fall below the stop, less TRANSMITTANCE_SLACK of it; finally C += T background.

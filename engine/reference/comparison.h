@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Compares float32 results with double: worst error against a tolerance, cosine, and bias.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/reference/kernel_table.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // KernelTable: value and slope of one kernel and footprint, fast enough for the inner loop. The
 // Gaussian and kernels with several pulses are computed directly. The others are tabulated once
 // from engine/kernels as piecewise Chebyshev interpolants: in q for the kernels themselves, and in

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // parallel_for hands out indices one by one to a few threads; used per tile and per block.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/reference/projection.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Projection of one splat to the image plane, values and hand-derived gradients.
 // Mean: pinhole. Covariance: S' = M M^T + low_pass I with M = sqrt(scale) J W R diag(s) (the EWA
 // approximation of Zwicker et al. 2001), kept as the Cholesky factor of its inverse.

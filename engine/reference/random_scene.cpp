@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/reference/random_scene.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Random splats in front of a random camera; a seed gives the same ones on every platform.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/reference/reference_density_control.h"
 
 #include <fmt/format.h>

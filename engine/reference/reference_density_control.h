@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Adaptive density control of 3DGS (`--strategy adc`), as decisions on the host: which splats are
 // cloned, split and removed, and what becomes of their parameters. Pure functions.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Lens distortion in double with hand-derived derivatives of first and second order; the terms are
 // those of engine/scene/camera.h.
 #pragma once

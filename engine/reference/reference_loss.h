@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The training loss of 3DGS, (1 - lambda) L1 + lambda (1 - SSIM), value and gradient. SSIM after
 // Wang et al. 2004: Gaussian window 11, sigma 1.5, zero padding, data range 1.
 #pragma once

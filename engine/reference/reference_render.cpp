@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/reference/reference_render.h"
 
 #include <fmt/format.h>

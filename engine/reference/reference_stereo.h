@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The cost of a plane at a pixel in stereo, in double: the truth for shaders/stereo. It uses rays
 // and planes in the world where the shader has homographies.
 #pragma once

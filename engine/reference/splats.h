@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The inputs of the reference: splat parameters in the scalar under test, and the settings of the
 // rasteriser. Layouts and units as in SplatModel; central differences need them in double.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/render/light_share.h"
 
 #include <algorithm>

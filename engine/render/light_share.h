@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How much of a picture's light comes from splats that few training views confirm. A splat's light
 // in a view is what it adds to the pixels: the sum of its T alpha over them.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/render/render_gradients.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pictures of splats, and gradients of a caller's loss on them by every parameter: the calls from
 // which to build a training loop of one's own. Gradients are exact derivatives of the picture that
 // is drawn; engine/reference has the same in double.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Renderer: one model on one device, and pictures of it from any camera, at a chosen accuracy.
 #pragma once
 

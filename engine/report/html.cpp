@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/report/html.h"
 
 #include <fmt/format.h>

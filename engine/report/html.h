@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pieces of HTML text: escaping, embedding, numbers.
 #pragma once
 

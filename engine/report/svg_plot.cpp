@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/report/svg_plot.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Plots as inline SVG elements: axes, ticks, units, legends, and values under the pointer. Colours
 // come from the page's CSS (classes s0, s1, ... for the series); see html.h.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Camera: a pinhole with its pose, in double, and optionally a lens before it, for pictures that
 // are to be distorted like the photo. Frame: x right, y down, z forward (COLMAP's). The centre of
 // the top left pixel is at (0.5, 0.5).

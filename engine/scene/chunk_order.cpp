@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/chunk_order.h"
 
 #include <algorithm>

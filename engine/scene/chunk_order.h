@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The order of splats in a file in which chunks of consecutive splats share their bounds
 // (compressed_ply.h): splats of a chunk lie close together. It is the Morton order with 10 bits per
 // axis that splat-transform uses, so that its files keep their chunks when they are written again.

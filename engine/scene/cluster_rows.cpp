@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/cluster_rows.h"
 
 #include <algorithm>

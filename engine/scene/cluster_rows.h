@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Palettes for many rows of numbers: k rows that stand for all of them, such that the sum of
 // squared distances is small. The rows are cut into leaves of equal size by medians (a k-d tree).
 // Each leaf gets centres in proportion to its error, and ten rounds of k-means (Lloyd 1982). For

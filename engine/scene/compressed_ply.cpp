@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/compressed_ply.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PlayCanvas's compressed PLY, as SuperSplat and splat-transform write it. Element chunk: bounds of
 // position, log scale and colour (the last may be missing) of 256 splats each; element vertex: four
 // uint32 a splat, relative to its chunk; element sh (may be missing): one byte a coefficient.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/dot_splat.h"
 
 #include <fmt/format.h>

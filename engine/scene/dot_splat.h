@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // .splat, the format of antimatter15's viewer: 32 bytes a splat and no header.
 //   position 3 x float32, standard deviation 3 x float32, r g b opacity 4 x uint8,
 //   rotation w x y z 4 x uint8 (q * 128 + 128)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Changes to a whole scene: similarities, which also rotate splats and harmonics, and selections of
 // splats, which keep the order of the rest.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/gaussian_scene.h"
 
 #include <algorithm>

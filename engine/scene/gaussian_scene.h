@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Converts a scene with another kernel to Gaussians, for viewers that know only these.
 #pragma once
 

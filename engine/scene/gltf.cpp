@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/gltf.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // glTF 2.0 with splats (KHR_gaussian_splatting), as .glb or .gltf: what the reader and the writer
 // share. docs/gltf.md says what is read and written, and describes darb's own extension.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Infinite parameters that are meaningful, with one rule for all readers. A logit of +-infinity is
 // an opacity of 1 or 0 (PLYs expanded from formats with one byte of opacity have it); a log
 // scale of -infinity is a splat without extent on that axis. They are replaced by the limits to

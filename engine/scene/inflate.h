@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // gzip (zlib) and Zstandard with bounds known in advance: no output is larger than the caller asks
 // for, whatever the bytes claim.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // .ksplat, the format of the viewer GaussianSplats3D (github.com/mkkellogg/GaussianSplats3D): a
 // header of 4,096 bytes, one of 1,024 bytes per section, then the sections: lengths of the buckets
 // that are not full, the buckets' centres, the splats. Numbers are float32 at compression level 0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Merges in rounds until few enough splats are left. A splat may merge with its nearest neighbours;
 // pairs are taken from the cheapest on, each splat at most once, up to a share of all in a round,
 // so that early merges are cheap. Each thread works on its own splats, and ties are broken by

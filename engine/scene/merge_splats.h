@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reduces the number of splats by merging: two neighbours become one with the sum of their
 // coverage, their mean and their second moment; pairs whose merging changes pictures least go
 // first. Only splats that are never drawn are dropped. docs/experiments/merging.md compares its

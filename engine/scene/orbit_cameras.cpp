@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/orbit_cameras.h"
 
 #include <algorithm>

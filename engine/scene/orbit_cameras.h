@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cameras for a scene that has none.
 #pragma once
 

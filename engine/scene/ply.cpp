@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/ply.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Splat scenes as PLY, the layout of 3DGS that every viewer reads: x y z nx ny nz f_dc_0..2
 // f_rest_* (all red, then green, then blue) opacity scale_0..2 rot_0..3, and three header comments:
 // SplatKernel, SplatFootprint and SplatRenderMode (default or mip).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The PLY container: its header, and the rows of one element as doubles. ascii and binary of both
 // byte orders. Splat files (ply.h) and point clouds (engine/data/point_cloud_ply.h) are read with
 // it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/pose_metric.h"
 
 #include <algorithm>

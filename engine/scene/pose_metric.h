@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PoseMetric: the six numbers by which a camera is moved, in pixels. A pose changes by a turn and a
 // move on its left, in the camera's frame:
 //   rotation' = exp(turn) rotation,  translation' = exp(turn) translation + move.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the small splat formats share: numbers with few bits, opacity and colour in one byte, and
 // quaternions without their largest component.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Real spherical harmonics of degree 0 to 3 in the order and with the signs of 3DGS.
 #pragma once
 

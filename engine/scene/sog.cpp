@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/sog.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // SOG version 2 (Spatially Ordered Gaussians, PlayCanvas): meta.json and lossless WebP images with
 // one pixel per splat, in a folder or in a zip. Source: developer.playcanvas.com, "The SOG format".
 //   means_l, means_u        low and high byte of 16 bits between mins and maxs of

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every splat file that can be read, recognised by content, and the files that can be written.
 // splat_format.h describes the row of facts for each format.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is known about a format of splat files: its row in the table of splat_file.h. Only the
 // formats themselves and splat_file.cpp include this.
 #pragma once

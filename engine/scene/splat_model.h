@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // SplatModel: the parameters of N splats as they are trained and stored (float32, on the host). C =
 // (sh_degree + 1)^2 coefficients per colour; SH order and signs as in 3DGS.
 #pragma once

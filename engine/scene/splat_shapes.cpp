@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/splat_shapes.h"
 
 #include <fmt/format.h>

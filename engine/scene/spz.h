@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // SPZ, Niantic's format (github.com/nianticlabs/spz). Versions 1 to 3: one gzip stream of a 16-byte
 // header and the attributes one after the other; version 4: a 32-byte header in the open, extension
 // records, a table of sizes and one Zstandard frame an attribute. Attributes, in order:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/stored_units.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Files with the columns of a 3DGS scene but other contents: scales that are not logarithms,
 // opacities that are not logits, colours instead of harmonics, quaternions in another order. Such a
 // file can be read without an error, but looks like fog when drawn. This converts such values, and

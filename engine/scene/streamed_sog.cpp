@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Streamed SOG version 1 (PlayCanvas): lod-meta.json and a folder with an unbundled SOG scene for
 // each file of a level. A tree of boxes says which rows of which file are in a leaf, level by
 // level. Source: developer.playcanvas.com, "The Streamed SOG Format".

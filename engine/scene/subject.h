@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Subject: what a scene is looked at for. It defines what a view orbits around, how fast it flies,
 // and what "Frame all" and a turntable show, in the viewer, in films and on web pages.
 #pragma once

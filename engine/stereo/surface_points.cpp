@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/stereo/surface_points.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Points on surfaces: places where the depths in several photos agree, a few pixels apart.
 #pragma once
 

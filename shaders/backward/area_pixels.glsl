@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The pixels of a thread in the backward blends that walk lists. Needs their bindings, lib/area.glsl and
 // lib/depth_sum.glsl.
 

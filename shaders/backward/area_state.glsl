@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The pixels' state between dispatches, where SEGMENT > 0. Needs backward/area_pixels.glsl.
 
 // What is behind the intersections of this dispatch, from and for the other dispatches.

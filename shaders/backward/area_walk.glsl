@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A subgroup walks a part of a tile's list from its end over the pixels of an area: what blend_backward.comp and
 // blend_backward_team.comp have in common. Needs their bindings, lib/area.glsl, lib/hits.glsl,
 // backward/splat_sums.glsl, splat_exponent, and where the sums of intersection j of the sorted list go: place_of(j),

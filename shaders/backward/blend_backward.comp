@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gradients of blend.comp: from dL/dimage to sums over pixels from which dL/d(mean, l11, l21, l22, opacity, colour)
 // follow, PARTIALS floats for each splat-tile intersection in the intersection's own slot, so that sums per splat need
 // no atomics and repeat bit by bit. Place: after the loss. Source: docs/math.md, Gradients.

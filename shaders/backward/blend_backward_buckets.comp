@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gradients of blend.comp as blend_backward.comp sums them, the other way round: a thread owns an intersection and
 // walks the tile's pixels, so that its sums stay in registers and go to the intersection's slot whole, without
 // reductions, atomics or additions to memory. Place: after bucket_behind. Source: Taming 3DGS (Mallick et al. 2024),

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gradients of blend.comp as blend_backward_team.comp, but nothing is reduced while splats are walked. All sums of a
 // splat follow from a few numbers of each pixel times constants of the pixel. So these numbers go to shared memory, and
 // after BATCH splats the subgroup turns: a lane has a splat and a part of the block's pixels. Place: after the loss.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gradients of blend.comp as blend_backward.comp sums them, in the same order of additions, so that both give the same
 // numbers, with TEAM subgroups a tile: each walks the tile's list over an area of its own, a chunk of intersections at a
 // time. Place: after the loss. Source: docs/math.md, Gradients.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is behind each bucket of a pixel's list, dotted with dL/dcolour: the bucket's own light in front of what is
 // behind it, last bucket to first, so that only convex combinations are made and nothing cancels (final colour less
 // the colour so far does, by 3 % after 10,000 layers). Place: between bucket_tiles and blend_backward_buckets.

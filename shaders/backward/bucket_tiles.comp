@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which tile each record of lib/bucket.glsl belongs to: its index + 1; records of no bucket are left as they are.
 // Place: first of the backward blend by buckets. Work: one workgroup a tile, one thread a bucket in turn. Shared
 // memory: none.

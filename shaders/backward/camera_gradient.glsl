@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // dL/d(camera) of one splat, of the numbers that project.comp computes with, each free: the rotation's nine entries
 // by rows, the centre held, then fx, fy, cx, cy. With CAMERA_GRADIENT; camera_sums.comp or the host adds the splats up,
 // and what the centre does is in dL/d(position). A lens keeps its own terms. Needs camera_model.glsl.

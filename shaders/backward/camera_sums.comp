@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Adds dL/d(camera) and dL/d(position) up over the splats, in a fixed order: bit-equal from run to run. Place: after
 // project_backward with CAMERA_GRADIENT. Work: CAMERA_SUM_THREADS threads a group; each thread adds every
 // groups * CAMERA_SUM_THREADS-th splat, then a tree in shared memory. Reads shares and positions' gradients; writes

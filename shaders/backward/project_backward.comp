@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sums a splat's partials over its tiles, takes them back through the projection to its parameters and does
 // the Adam step there (UPDATE_ADAM), or leaves the gradients in buffers, in place of what they hold (UPDATE_STORE)
 // or added to it (UPDATE_ADD): adam_update.comp makes the step of these.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From the summed partials of one splat to the gradients of its parameters: the exact derivative of project.comp.
 // Source: docs/math.md, Gradients. Needs camera data, covariance.glsl, rest.glsl and the parameter buffers.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What one splat and one pixel give to the gradients of an intersection, walking back to front: T before a splat is T
 // after it / (1 - alpha), and 1 - alpha >= 0.01 by ALPHA_MAX; what is behind, dotted with dL/dcolour, is a convex
 // combination, so nothing cancels. Needs kernels/kernel.glsl.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The chunk of a tile's list that a team works off. Needs CHUNK, THREADS, chunk_begin, chunk_slot and chunk_word.
 
 void load_chunk(uint end) {

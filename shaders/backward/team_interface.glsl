@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Constants and buffers of blend_backward_team.comp and blend_backward_pixels.comp: the same, in the same places.
 
 #include "shared/limits.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Decides for every splat whether density control keeps, clones, splits or prunes it.
 // Source: docs/math.md, Density control; 3DGS section 5, graphdeco's thresholds. Place: between iterations.
 // Work: one thread a splat. Shared memory: none. Writes keep (0, 1) and grow (0, 1) for their scans.

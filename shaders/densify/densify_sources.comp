@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where each splat of the next generation comes from. Kept splats close up in order; a clone's copy and a split's
 // second child go behind them. Place: after the scans of keep and grow.
 // Work: one thread an old splat. Shared memory: none.

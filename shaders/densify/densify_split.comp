@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Moves and shrinks the children of split splats: an offset drawn from the kernel's own radial density, in the
 // parent's frame, and scale / 1.6. Place: after the gathers. Source: docs/math.md, Density control; 3DGS section 5.
 // Work: one thread a new splat. Shared memory: none.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Moves one attribute to the next generation's order; new splats copy their source, or start at zero (moments).
 // Place: after densify_sources, once an attribute and pair of ranges; every source lies in one range.
 // Work: one thread a float, with COLUMNS a column of what lies in blocks (lib/rows.glsl). Shared memory: none.

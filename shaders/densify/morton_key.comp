@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The place of each splat on a space-filling curve: the bits of its cell's three numbers in turn (Morton 1966).
 // What lies outside of the grid counts to the cell at its border, what has no place to the last cell of all.
 // Place: before the sort of splats after density control. Work: one thread a splat. Shared memory: none.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The sorted order as gather_attribute reads it: every splat is kept, none is new. Place: after the sort by
 // morton_key. Work: one thread a splat. Shared memory: none.
 #version 460

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Noise on positions: the covariance times a normal vector, for splats that are nearly transparent, so that they find
 // places where something is missing. Place: mcmc, after every step of the optimiser.
 // Source: 3DGS-MCMC (arXiv 2404.09591) equation 8; the gate sigmoid(-100 (opacity - 0.005)) is its authors' choice.

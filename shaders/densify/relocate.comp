@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a splat becomes when several stand in its place and the picture is to stay: each lets through the count-th
 // root of what it let through, and is scaled by the kernel's own factor. Place: mcmc, after the gathers.
 // Source: 3DGS-MCMC (arXiv 2404.09591) equation 9; for any kernel docs/math.md, engine/kernels/relocation_table.h.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One live splat for each dead and each new one, drawn in proportion to the weights, and how often each was drawn.
 // Place: mcmc, after the scan of the weights. Source: 3DGS-MCMC (arXiv 2404.09591) section 3.
 // Work: one thread a draw. Shared memory: none. The counts are integer sums: the same in any order.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where each splat of the next generation comes from: a live one stays in its place, a dead one's place and the places
 // behind the last go to the splats that were drawn. What is drawn counts as new itself: it changes, too.
 // Place: mcmc, after the draws and the scan of the dead. Work: one thread a new splat. Shared memory: none.

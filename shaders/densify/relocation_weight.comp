@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Who is dead, and with what integer weight the others are drawn: in proportion to their opacity. Integers, so that
 // their scan is exact and a draw depends on no order of sums.
 // Place: mcmc, before the scans. Source: 3DGS-MCMC (arXiv 2404.09591) section 3.

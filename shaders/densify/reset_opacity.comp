@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Opacity reset: every opacity down to at most the given one, its moments to zero. Place: between iterations.
 // Work: one thread a splat. Shared memory: none.
 #version 460

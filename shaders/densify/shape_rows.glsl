@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where a splat's shape lies between the rows of a table over it (engine/kernels/shaped_kernel.h). SHAPES: the rows;
 // 1: the kernel has no shape, and the buffer of shapes is not read.
 layout(constant_id = 2) const uint SHAPES = 1;

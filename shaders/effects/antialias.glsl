@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Anti-aliasing of Mip-Splatting (Yu et al. 2024): opacity gives back what blurring adds to a splat's light, by the
 // low-pass in the image (equation 10) and by the 3D filter in the world (equation 9). Needs covariance.glsl.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From a point in the camera to its pixel, the rows of the Jacobian there, and their gradients. The camera is a
 // pinhole; OFF_CENTRE and LENS of effects/constants.glsl say what else it is. Needs covariance.glsl.
 

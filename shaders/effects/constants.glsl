@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The switches of the effects that live in the projection, forward and backward alike. A frozen 0 leaves no
 // instruction of the effect and no read of its data.
 

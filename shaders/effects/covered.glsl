@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the splats alone leave at a pixel, beside the background that is seen through them. The includer declares args,
 // image and final_transmittance.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Puts (depth, 1, 0) in the place of each projected splat's colour: blended again over black, the picture holds
 // sum w z and sum w, whose quotient is the expected depth. Place: after a frame, before blend runs once more.
 // Work: one thread a splat. Shared memory: none. Reads depths; writes the colours of the projected splats.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Maps the colours of a picture by its photo's exposure, an affine 3 x 4 matrix: those of the splats alone, as if each
 // splat's colour were mapped. The background is in no photo and stays as it is. Place: between blend and loss, in
 // training alone. Source: per-image exposure of 3DGS (2024) and of NeRF in the Wild's affine form.

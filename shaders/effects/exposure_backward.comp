@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The gradient of exposure.comp: d_image becomes that of the picture before the map, and every group sums
 // the map's own gradient, the same in every run. What is covered counts for the map's offset, which the picture's
 // gradient does not tell: that goes to the plane dL/d(1 - transmittance). Place: between loss and blend_backward.

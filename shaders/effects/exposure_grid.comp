@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // As exposure.comp, by a bilateral grid of maps in place of one: tones that a camera changed from place to place. Place:
 // between blend and loss, in training alone.
 // Work: one thread a pixel. Shared memory: none. Reads picture, transmittance and maps; writes the mapped picture.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where a pixel lies in a photo's bilateral grid of colour maps, and the map there: trilinear between the vertices,
 // across the picture, down, and by the luminance of what the splats show. Source: Bilateral Guided Radiance Field
 // Processing, arXiv 2406.00448. The includer declares args and maps.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The gradient of exposure_grid.comp to the picture: d_image becomes that of the picture before the map, and its last
 // plane dL/d(1 - transmittance), as exposure_backward.comp leaves them. A colour counts for where it lies in the grid,
 // too. Place: between exposure_grid_gradient, which reads d_image as it was, and blend_backward.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The gradient of exposure_grid.comp to a photo's grid of maps, with that of its smoothness. Place: between loss and
 // exposure_grid_backward.
 // Work: a group a vertex of the picture's plane, for all luminances: it walks over the pixels around, which are its

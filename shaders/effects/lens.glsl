@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Lens distortion in the projection: the models of engine/data/lens_model.h on the plane z = 1, their Jacobian and the
 // gradient through it. A lens is a front, u a(|u|^2) with a = atan(c r) / (w r) (fisheye, FOV; none where w = 0),
 // followed by w g(|w|^2) + tangential + thin prism with g a quotient of polynomials. Matrices: m[column][row].

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Blends each tile's splats front to back. alpha = min(0.99, opacity * w(q)); below the cut-off nothing; a pixel
 // ends before the splat that would bring its transmittance below 1e-4, less the slack of limits.h. Place: last
 // pass of the forward walk.

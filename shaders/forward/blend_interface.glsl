@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Constants, buffers and what else the forms of the forward blend read and write, the same in the same places.
 
 #include "shared/limits.h"

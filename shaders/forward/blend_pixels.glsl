@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The pixels of a thread in the forward blends, and one sample on one of them. Needs forward/blend_interface.glsl.
 
 struct Pixels {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The form `records` of blend.comp, for devices where an instruction more or less counts: splats from shared memory
 // (lib/records.glsl), and no test of ends before the first pixel of the block ends. Place: last pass of the forward walk.
 // Work: one workgroup a tile, one subgroup a block of it. A batch of as many splats as there are lanes is blended without

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The pixels of a thread from and to the outputs. Needs forward/blend_pixels.glsl.
 
 // The state that the dispatch before this one left.

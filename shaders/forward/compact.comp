@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gathers the visible splats: their depth as a sortable key and their index, in file order.
 // Place: after the scan of the visible flags. Work: one thread a splat. Shared memory: none.
 #version 460

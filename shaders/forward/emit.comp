@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Writes one intersection for each tile that a visible splat touches, in depth order: the tile as sort key and the
 // splat. Place: after the scan of the intersection counts. Work: one thread a visible splat. Shared memory: none.
 // Counts the huge splats; with COOPERATE it lists their ranks instead of writing their intersections.

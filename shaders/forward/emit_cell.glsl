@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The intersections of cells of a splat's cover, for emit.comp and emit_huge.comp, which declare args,
 // tile_from_intersection and splat_from_intersection. Needs tile.glsl.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The intersections of the splats that emit.comp left over: the same intersections in the same slots, so that the lists
 // are bit-equal. Place: after emit.comp, in frames whose predecessor had huge splats. Work: a workgroup takes every
 // EMIT_HUGE_GROUPS-th huge splat, a thread one of the 64 cells of its cover. Shared memory: none. Reads covers and

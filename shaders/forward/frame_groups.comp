@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sizes the dispatches over visible splats and over intersections, and notes an overflow of the intersection buffers.
 // One: after the scan of the flags (STAGE 0), one after the scan of the counts (STAGE 1).
 // Work: one thread. Shared memory: none.

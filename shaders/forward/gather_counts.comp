@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The intersection counts in depth order, ready for their scan. Place: after the depth sort.
 // Work: one thread a visible splat. Shared memory: none.
 #version 460

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The longest of the tiles' lists, and whether it is longer than the blend dispatches take on.
 // Place: after tile_ranges. Work: one thread a tile. Shared memory: none.
 #version 460

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Projects every splat: camera space, Cholesky factor of the projected covariance, colour from SH, reach and
 // the tiles that it touches. Place: first pass of a frame. Source: docs/math.md, Projection.
 // Work: one thread a splat. Shared memory: none. Reads parameters; writes the projected splat and its cover.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Finds where each tile's run of intersections begins and ends in the sorted intersections; tiles without intersections
 // keep (0, 0). Place: after the tile sort. Work: one thread an intersection. Shared memory: none.
 #version 460

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An image of half the size, brought to full size by linear interpolation: the accuracy setting "resolution 1/2".
 // Pixel centres at +0.5 in both; outside the outermost centres the nearest one. Place: after blend.
 // Work: one thread a pixel of the result. Shared memory: none.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // w = u^e = 2^(e log2 u), u = 1 - q/R^2: the kernel `beta`, whose exponent e each splat has of its own
 // (engine/kernels/shaped_kernel.cpp). log2 by additions, multiplications and one division, so that a centre has
 // log2 = 0 and a device the accuracy of float32, where Vulkan's log2 may be off by 2^-21.

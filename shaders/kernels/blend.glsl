@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // w = (1 - m) w1 + m w2, m of each splat: a blend of two kernels (engine/kernels/shaped_kernel.cpp). The first is that of
 // the constants KERNEL_*, the second that of these, whose code is the first's under other names.
 layout(constant_id = 160) const int BLEND_FORM = KERNEL_FORM_GAUSSIAN;

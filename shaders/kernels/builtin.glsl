@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kernels by the formulas of the paper, with sqrt, division and the built-in exp, sin and cos, corrected near
 // d = 0. For comparison of cost and accuracy; Vulkan leaves sin and cos 2^-11 of error. Only kernels that have
 // such a formula: others, and the exact footprints of the compact ones, keep their polynomial. KERNEL_SUPPORT ends

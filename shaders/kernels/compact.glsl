@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // w = u^a P(x), u = 1 - x, x = t or t^2, t = q/R^2: every kernel that falls to zero at its edge, and its exact
 // footprint. slope = u^(a-1) (u P' - a P) dx/dq. Source: Taylor forms of the kernels, fitted by engine/kernels.
 // u^(a-1) for a of 3/2 to 9/2; the tests of the constant fold away.

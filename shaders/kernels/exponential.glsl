@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // w = exp(-((q + s)^(t/2) - s^(t/2)) / 2): the kernel `generalized_exponential`, whose exponent t each splat has of
 // its own (engine/kernels/shaped_kernel.cpp). s bounds the slope at the centre, and w is 1 there: both powers
 // come out of the same steps; that of s is one of the splat. One logarithm and two powers of two a pixel: multiplications

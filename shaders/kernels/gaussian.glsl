@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // w = exp(-q/2) = 2^n 2^f: n is added to the exponent bits, 2^f is P(f) on [-1/2, 1/2] with P(0) = 1 and
 // P(1/2) = 2 P(-1/2), so w is 1 at the centre and has no jump. Below 2^-126 it stays there. The
 // slope -w/2 is the derivative of the polynomial up to the latter's own error, which is below rounding from degree 5

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // w = exp(-q/2), whose lengths are those of the splat times f(t): the kernel `ges_published`, GES as its program draws
 // it. t is a parameter of each splat (engine/kernels/shaped_kernel.cpp); nothing but psi = f^2 knows it.
 void ges_value_slope(float q, out float w, out float slope) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kernel contract of all shaders: w and dw/dq as functions of q = d^2, and how far they reach. Which
 // kernel runs is a set of specialization constants (engine/raster/kernel_constants.h sets them), so that after
 // constant folding one kernel's arithmetic is left. The constants alone, unset, are the Gaussian by exp().

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Evaluates the kernel contract on an array of q (and of opacities, for the reach): tests and `darb check`
 // compare the result with double. One thread an entry. Reads q, opacity; writes value, slope, reach.
 #version 460

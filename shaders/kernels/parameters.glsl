@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the arithmetic of a form depends on beside q, as engine/kernels derives it for each kernel. Functions of forms
 // take it by value: a kernel and the second of a blend are two values, and what is left of either folds as constants do.
 struct KernelParameters {

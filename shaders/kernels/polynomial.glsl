@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // P and dP/dx by Horner; folds to `degree` and `degree` - 1 steps.
 // One step; the first one only starts the chain.
 void polynomial_step(const KernelParameters k, int power, float x, inout float p, inout float dp) {

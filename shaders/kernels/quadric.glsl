@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // w = (1+q)^-1 or (1+q)^-1/2, cut at R^2, and their line integrals. With x = sqrt((1+q)/(1+R^2)), r = 1/x the
 // integrals are r acos x = r sqrt(u) P(x) and acosh r = sqrt(h) P(r - 2), h = u r/(1+x), up to a factor. Their
 // slope grows without bound at the edge, where w is below any cut-off.

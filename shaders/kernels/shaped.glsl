@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What each kernel whose shape each splat has of its own is to the passes; their twin is ShapedKernel
 // (engine/kernels/shaped_kernel.h). One of them is left after constant folding, or none.
 layout(constant_id = 113) const int BLENDED = 0;  // 1: a blend of the kernel with that of BLEND_*

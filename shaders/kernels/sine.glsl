@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // sin and cos from additions and multiplications alone, which Vulkan rounds correctly, for |x| up to a few turns:
 // off by 2e-7 at most, where the built-in ones may be off by 2^-11. x is taken to the nearest multiple of pi, which
 // stands as two floats; polynomials in r^2 are Chebyshev interpolants over [-pi/2, pi/2], off by 2e-10 and less.

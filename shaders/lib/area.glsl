@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How a tile's pixels are dealt to threads. A subgroup has the slots of an area at a time: a block of the tile, so
 // that a splat which misses it costs nothing there; where threads have fewer pixels part of a block, where they have
 // more several. A thread's pixels differ by constants.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Checkpoints of the forward blend for a backward blend that works off buckets of a tile's list side by side: a
 // record of four planes of the tile's pixels for each bucket. The forward pass leaves the light that the bucket's
 // splats add to the pixel, three planes, and the transmittance behind them; bucket_behind.comp puts what is behind

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From a splat's parameters and a camera to the projected Cholesky factor, with its derivatives' ingredients.
 // M = sqrt(scale) J W R diag(s), S' = M M^T + low_pass I, q = (l11 dx + l21 dy)^2 + (l22 dy)^2 (docs/math.md).
 #include "lib/finite.glsl"

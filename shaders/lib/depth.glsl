@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The depth order of the splats: which one, and the keys that the splats are sorted by.
 #ifndef DARB_DEPTH_GLSL
 #define DARB_DEPTH_GLSL

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Whether pixels have the sum of weight times depth beside their colour: a fourth plane of the picture, a fifth of its
 // gradient, after that of dL/d(1 - transmittance), and a sum more for each intersection.
 #ifndef DARB_DEPTH_SUM_GLSL

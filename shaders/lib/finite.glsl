@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Comparisons that hold for NaN and infinity on every device, by the bits: SPIR-V as compiled here promises
 // nothing of them, and drivers that assume that there are none (fast math of Metal, LLPC) may turn !(x < y) into
 // x >= y and isnan(x) into false. Without their sign the bits are ordered as the magnitudes, then infinity, then NaN.

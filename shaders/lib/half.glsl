@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Rounding to half precision, the same wherever a value is stored as a half: packHalf2x16 may truncate, so the
 // value is rounded to nearest even before.
 #ifndef DARB_HALF_GLSL

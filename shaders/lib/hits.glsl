@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The intersections of a stretch of the tile's list that touch the subgroup's area, packed together, so that the loop
 // over them has neither gaps nor branches. Needs the constants THREADS, SUBGROUP_SIZE and CHUNK, the intersections that
 // are looked at before those found are worked off, and the buffers intersection_from_sorted and

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The stretch of a tile's list that a dispatch works off. Needs the specialization constant SEGMENT: intersections of a
 // stretch, or 0 for whole lists in one dispatch.
 uvec2 list_part(uvec2 range) {

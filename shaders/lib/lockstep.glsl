@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The order of shared memory accesses among the threads of a subgroup.
 // LOCKSTEP 1: they are the lanes of one vector, as on lavapipe, and need no barrier among them. lavapipe of
 // Mesa 25.0 makes one of the whole workgroup, and loses the subgroups that go on after another has ended.

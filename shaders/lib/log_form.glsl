@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The Gaussian by logarithms: opacity * w = 2^e, e = log2(opacity) - x^2 - y^2 with the factor scaled by FACTOR_SCALE.
 // It takes neither a product for the scale of the exponent nor one for the opacity. Where the slope is -w/2, LOG_FORM.
 // Needs kernels/kernel.glsl.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The sums of splat-tile intersections, PARTIALS floats each, in the order of the intersections' slots: blend_backward
 // adds to them (define PARTIALS_PUT as +=), blend_backward_team sets them (as =), blend_backward_pixels sets four at a
 // time (PARTIALS_PUT_FOURS), others read them. Where they are more than one binding holds, the buffer is bound

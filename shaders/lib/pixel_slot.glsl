@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A tile's 256 pixels by slots, block after block of 8 x 8: bits 0-2 of a slot are x, 3-5 are y, 6 is the block's x,
 // 7 its y. Slots of disjoint bits add up to pixels.
 #ifndef DARB_PIXEL_SLOT_GLSL

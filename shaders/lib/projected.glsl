@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Projected splats as project.comp leaves them for the passes over intersections, in float32 or float16.
 // Needs SHAPE_BINDING, LIGHT_BINDING and BOUND_BINDING; each buffer has two views, of which STORAGE picks one.
 #include "lib/half.glsl"

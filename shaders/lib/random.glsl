@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Counter-based random numbers (pcg hash, Jarzynski and Olano 2020): the same on every device.
 uint random_hash(uint v) {
     const uint state = v * 747796405u + 2891336453u;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Splats as the lanes of a subgroup share them: each lane loads one and leaves it in shared memory, from where all read
 // it by one address, 16 bytes at a time: three loads a splat in place of a shuffle for each of its numbers. An area is
 // one block here, and positions are relative to its centre, so that (x, y) is a plane over its pixels whose offsets are

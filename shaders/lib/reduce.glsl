@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sums of eight values over a subgroup, each in lanes of its own, so that every shuffle halves what is left to add.
 // Needs SUBGROUP_SIZE, a power of two from 4 to 64.
 

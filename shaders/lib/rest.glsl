@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The harmonics above the first band of a splat: three columns of four floats are four coefficients of three channels.
 // Needs SH_DEGREE, SH_STORED, sh.glsl and the buffer sh_rest.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where the harmonics above the first band lie, and what belongs to them (moments, gradients, sums): in blocks of
 // ROW_BLOCK splats, in each a column of ROW_BLOCK vec4 after the other. So neighbouring threads read neighbouring words,
 // and a thread reads four floats at once. engine/raster/attribute_rows.h has the same for the host.

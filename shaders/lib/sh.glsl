@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Real spherical harmonics of degree 0-3 with the constants, order and signs of 3DGS.
 // SH_DEGREE is a specialization constant of the including shader.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the floats of a splat stand for. As files and training have them: the logit of the opacity, logarithms of
 // scales, harmonics of a colour that is clamped at 0. LINEAR_VALUES: the opacity and the scales themselves, as
 // calls of renderers give them. DIRECT_COLOUR: sh_dc is the colour, of any sign, and there are no other harmonics.

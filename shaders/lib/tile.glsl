@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The part of a splat's ellipse within a band of pixel rows, for the tiles of a splat and the blocks of a tile: a
 // rectangle is touched where its rows' part of the ellipse reaches its columns.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The resorting window of DEPTH_ORDER_PIXEL: a pixel holds back the last WINDOW samples, sorted by their depth at
 // the pixel, and blends the nearest when one more comes. Source: StopThePop (Radl et al. 2024), its last level.
 // Depth at a pixel: the mean of the splat's depth there, z - slope . (x, y), which is exact for the affine

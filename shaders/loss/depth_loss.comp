@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The gradient of the loss of depths: the absolute difference of a pixel's depth D = sum w z / sum w, w the weight of
 // each splat and z its depth along the optical axis, from the one that was measured there, world units. It counts where
 // there is one, and where the splats cover at least half of the pixel: of less no surface follows. Place: after the

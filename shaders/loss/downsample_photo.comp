@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A smaller photo: every pixel is the mean of the area that it covers, colours weighted by their alpha. With DEPTHS
 // depths follow, of the measured pixel nearest to the middle of that area: a mean of two surfaces lies on neither.
 // Place: the resolution ramp, once a photo and step. Work: one thread a pixel of the result. Shared memory: none.

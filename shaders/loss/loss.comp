@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // (1 - lambda) L1 + lambda (1 - SSIM) and its gradient, forward and backward in one walk. Place: after blend.
 // Source: 3DGS equation 7; SSIM of Wang et al. 2004, 11x11 Gaussian window of sigma 1.5, zero padding.
 // With a = x + y, b = x - y (x rendered, y photo) SSIM needs four blurred maps: a, b, a^2, b^2; its gradient

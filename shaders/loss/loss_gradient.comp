@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The loss by tiles, second of two passes: the gradient from the derivatives that loss_maps.comp left, blurred, in the
 // order of loss.comp: across first, then row by row. Work: a workgroup has a tile of one channel, a thread a pixel.
 // Reads image, photo, maps; writes d_image.

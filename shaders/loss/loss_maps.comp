@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The loss by tiles, first of two passes: SSIM and its derivatives. For devices where the strips of loss.comp, with
 // their 100 and more values a thread, cost more: this way a thread holds few, needs no subgroup operations, and the
 // three derivatives of a pixel go through memory. Source and sums as in loss.comp, operations in the same order.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Adds the partial sums of the strips in a fixed order: bit-equal from run to run. Place: after loss.
 // Work: one workgroup; each thread adds every LOSS_SUM_THREADS-th strip, then a tree in shared memory
 // (LOSS_SUM_THREADS vec4). Reads the partial sums; writes one LossResult.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the passes of the loss compare at a pixel. The includer declares args, image, photo, USE_ALPHA and USE_MASK.
 
 bool in_image(int x, int y) {

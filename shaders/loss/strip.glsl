@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The SSIM window walked down and across a strip. Loop bounds and indices are constants after unrolling: everything
 // stays in registers. The includer declares LANES and COLUMNS.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Tiles of the loss: which one a workgroup has. A row of workgroups has the channels of each tile side by side.
 
 struct Tile {

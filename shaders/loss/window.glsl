@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The SSIM window, 11 taps of sigma 1.5, and SSIM from blurred maps.
 
 const float TAP0 = 0.26601171493530273, TAP1 = 0.2130055278539657, TAP2 = 0.1093606948852539,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Copies a buffer and nothing else: the rate of a device's memory, where its own copies go another way.
 // Work: vectors of four floats, each thread one of every so many. Shared memory: none.
 #version 460

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Multiply-adds in registers and nothing else: the arithmetic rate of a device.
 // Work: MEASURE_STEPS steps of MEASURE_CHAINS chains a thread. Shared memory: none.
 #version 460

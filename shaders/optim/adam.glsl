@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One Adam step of one parameter (Kingma and Ba 2015, bias correction as in PyTorch).
 // moment = (first, second); the result goes back into it. A pass with betas of its own names them before.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The Adam step of one attribute, of gradients that stand in buffers: of several views, or the caller's own.
 // The same step as project_backward.comp makes of one view, with its regularisers and limits.
 // Place: once an attribute and range, after the gradients of all views. Source: Kingma and Ba 2015.

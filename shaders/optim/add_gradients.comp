@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Adds one buffer of gradients to another: those of another view or process, in the order that the host chose.
 // Place: before adam_update. Work: one thread a float. Shared memory: none.
 #version 460

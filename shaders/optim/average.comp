@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The mean of a parameter over iterations, one more taken in: mean += (value - mean) / iterations so far.
 // Place: the end of a run, between iterations. Work: one thread a float. Shared memory: none.
 #version 460

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One Adam step of one photo's exposure, after which the mean of all maps is the identity again: a change common to
 // all photos is the scene's own. Place: after exposure_backward. Source: Kingma and Ba 2015.
 // Work: a thread a term of the map, or of the grid of maps. Shared memory: none. Does nothing when the frame overflowed its

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The centre nearest to each row of numbers: the step of k-means that costs. Squared distances less what all
 // centres of a row share, |c|^2 - 2 x c; the first of equal ones wins.
 // Place: SOG's palette of harmonics, engine/publish. Work: a workgroup takes up to ROWS times THREADS rows of one batch, a

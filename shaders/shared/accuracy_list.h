@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Ids of the accuracy choices that the shaders know, shared by C++ and GLSL.
 #ifndef DARB_ACCURACY_LIST_H
 #define DARB_ACCURACY_LIST_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The attributes of a splat by number: the order of their buffers, moments, gradients and rates, in
 // bindings and in checkpoints. What each is stands in engine/scene/splat_model.h.
 #ifndef DARB_ATTRIBUTE_LIST_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of the search for the nearest centre (shaders/publish/nearest_centre.comp,
 // engine/publish/device_clusters.h).
 #ifndef DARB_SHARED_CLUSTER_ARGS_H

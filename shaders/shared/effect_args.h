@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of the effects' passes, read by C++ and GLSL alike (scalar layout).
 #ifndef DARB_EFFECT_ARGS_H
 #define DARB_EFFECT_ARGS_H

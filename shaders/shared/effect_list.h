@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The list of effects: what a scene may call for beyond plain splats. Each is compiled in, has its
 // buffers and its gradients only when it is on. The rules stand in
 // engine/plan/effect_plan.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The forms of arithmetic that serve the kernels in the shaders; see shaders/kernels/kernel.glsl.
 #ifndef DARB_KERNEL_FORMS_H
 #define DARB_KERNEL_FORMS_H

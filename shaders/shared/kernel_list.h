@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The list of reconstruction kernels and footprints: ids that C++ and GLSL share.
 // The maths of each row stands once, in engine/kernels (double); GLSL gets coefficients from there.
 #ifndef DARB_KERNEL_LIST_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of shaders/kernels/kernel_probe.comp, read by C++ and GLSL.
 #ifndef DARB_KERNEL_PROBE_ARGS_H
 #define DARB_KERNEL_PROBE_ARGS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What C++ and GLSL agree on about the lens of a camera.
 #ifndef DARB_LENS_H
 #define DARB_LENS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Limits at which parameters are clamped where they are read, and splats are rejected. A clamped
 // parameter has a gradient of zero outside. Shared by C++ (engine/reference) and GLSL.
 #ifndef DARB_LIMITS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Argument structs of the loss passes, read by C++ and GLSL alike (scalar layout).
 #ifndef DARB_LOSS_ARGS_H
 #define DARB_LOSS_ARGS_H

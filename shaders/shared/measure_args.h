@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of the passes that measure a device's rates, read by C++ and GLSL alike.
 #ifndef DARB_MEASURE_ARGS_H
 #define DARB_MEASURE_ARGS_H

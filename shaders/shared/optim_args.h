@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of the projection backward with its fused Adam step, of density control, and of the
 // iterates' mean.
 #ifndef DARB_OPTIM_ARGS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of the passes that put splats into another order in memory.
 #ifndef DARB_ORDER_ARGS_H
 #define DARB_ORDER_ARGS_H

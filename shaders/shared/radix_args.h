@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of the radix sort (shaders/sort/radix_*.comp, engine/primitives/radix_sort.h).
 #ifndef DARB_SHARED_RADIX_ARGS_H
 #define DARB_SHARED_RADIX_ARGS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Argument structs of the render passes, read by C++ and GLSL alike (scalar layout).
 // N splats, V visible, K splat-tile intersections, T tiles.
 #ifndef DARB_RENDER_ARGS_H

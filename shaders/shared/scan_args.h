@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of the exclusive prefix sum (shaders/sort/scan_*.comp, engine/primitives/scan.h).
 #ifndef DARB_SHARED_SCAN_ARGS_H
 #define DARB_SHARED_SCAN_ARGS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of the passes that find depth by comparing photos.
 #ifndef DARB_STEREO_ARGS_H
 #define DARB_STEREO_ARGS_H

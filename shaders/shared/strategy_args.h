@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arguments of the passes of the strategy mcmc, and of the resolution ramp.
 #ifndef DARB_STRATEGY_ARGS_H
 #define DARB_STRATEGY_ARGS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // GLSL type names for C++, so that the structs of shaders/shared read the same in both languages.
 // Scalar layout: vec3 is 12 bytes and nothing is padded. Under GLSL this file is empty.
 // A struct is written as: #include "types.h", then (C++ only) a static_assert on its size.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Argument structs of the passes that only the viewer runs (shaders/view), read by C++ and GLSL.
 #ifndef DARB_VIEW_ARGS_H
 #define DARB_VIEW_ARGS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Radix sort, step 1 of 3 of a pass: how often each digit occurs in each block.
 // One workgroup a block of THREADS * ITEMS keys. Shared memory: 1 KiB of counters.
 // Reads keys [n]; writes histograms [digits][blocks], and adds to the totals [digits] of the pass.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Radix sort, step 1 of 3 of a pass, for lavapipe: how often each digit occurs in each block.
 // One workgroup, which is one subgroup, a block of THREADS * ITEMS keys; columns as in
 // radix_scatter_columns.comp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Radix sort, step 2 of 3 of a pass: where the keys of each digit and block go, an exclusive sum over all digits and, of
 // a digit, over the blocks. One workgroup a digit: it sums the totals of the digits before its own, and walks its row
 // THREADS blocks at a time. With TEAM_IS_THREAD one thread a digit: see scan_team.glsl. Shared memory: a word a subgroup.

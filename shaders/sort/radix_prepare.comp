@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Radix sort, once a sort: turns the pair count on the device into a block count, and sets the totals to 0.
 // One workgroup. Reads the count; writes the plan, whose head is an indirect dispatch command, and the totals.
 #version 460

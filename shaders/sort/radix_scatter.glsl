@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What both scatter shaders of the radix sort bind (step 3 of 3 of a pass).
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 32;

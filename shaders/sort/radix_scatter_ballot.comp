@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Radix sort, step 3 of 3 of a pass, for GPUs: a subgroup ranks a row of keys by one ballot a digit
 // bit; rows of a subgroup are contiguous, so that all reads are. The block's keys are brought in order in shared memory,
 // so that those of a digit are written side by side. After Adinets and Merrill 2022.

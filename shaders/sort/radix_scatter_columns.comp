@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Radix sort, step 3 of 3 of a pass, for lavapipe: every thread walks ITEMS contiguous keys with a
 // private column of counters, so that neither ranking nor order needs other threads.
 // One workgroup, which is one subgroup, a block of THREADS * ITEMS keys. The columns are an

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scan, step 4 of 4: offsets of every element from the offset of its chunk. One team
 // (scan_team.glsl) a chunk, no shared memory.
 // Reads counts [n], chunk_offsets [chunks]; writes offsets [n]. With IN_PLACE the counts are read where the offsets go,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scan, step 1 of 4: turns the element count on the device into chunk and workgroup counts.
 // One thread. Reads the count; writes the plan, whose head is an indirect dispatch command.
 #version 460

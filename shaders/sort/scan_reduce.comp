@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scan, step 2 of 4: the sum of every chunk. One team (scan_team.glsl) a chunk, no shared memory.
 // Reads counts [n]; writes chunk_sums [chunks].
 #version 460

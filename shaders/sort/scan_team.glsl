@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Teams of the scan: CHUNK contiguous elements belong to one team. On GPUs a team is a subgroup, so
 // that neighbouring lanes touch neighbouring words; on lavapipe it is one thread, because there a
 // loop in registers is far cheaper than a subgroup scan. Nothing depends on the subgroup size but

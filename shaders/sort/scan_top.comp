@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scan, step 3 of 4: exclusive prefix sum of the chunk sums, in place, and the total.
 // One workgroup; every thread owns a contiguous run of chunks. Shared memory: a word a subgroup.
 #version 460

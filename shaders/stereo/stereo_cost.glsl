@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a plane costs at a pixel: 1 - correlation of the greys in its window with those of the source photos where
 // the plane puts them, the mean over the better half of the sources. Weights fall with the distance in grey from the
 // middle, so that a window keeps to one surface (as in COLMAP, Schoenberger et al. 2016).

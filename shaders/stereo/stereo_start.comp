@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A first plane for each pixel: the best of several that face the camera, at inverse depths drawn from as many
 // parts of the range. Place: once a photo, before the sweeps. Work: one thread a pixel. Shared memory: none.
 // Reads greys, sources; writes planes.

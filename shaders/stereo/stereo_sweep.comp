@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PatchMatch on a chess board (Barnes et al. 2009; Galliani et al. 2015): each pixel of one colour tries the planes of
 // the better of two pixels of the other colour at each of four distances, then random changes of its best. Place: for each colour, several times a photo.
 // Work: one thread a pixel of the colour. Shared memory: none. Reads greys, sources, planes of the other colour;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Turns a blended frame into 8-bit pixels for a window: the picture, or a heat map of error,
 // depth or work. A frame that had no room for its intersections leaves the picture before it, scaled to its size: the
 // host does it again, and knows so only some frames later. Place: after blend, in the viewer alone.

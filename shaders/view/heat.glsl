@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Colours of a heat map.
 
 // Black, violet, red, orange, pale yellow: dark to light, so that it also reads in grey.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Writes one strip of pictures side by side: a picture, or its difference to another one as heat. Place: after the
 // pictures were drawn, in the viewer. Work: one thread a pixel of the strip. Shared memory: none. Reads two pictures,
 // B8G8R8A8, alpha 0 where a picture has nothing (a photo's camera sees less than the window); writes B8G8R8A8.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The photo in a frame. The including shader has the DisplayArgs `args` and the buffer `photo`.
 
 // The photo at the frame's pixel, over the background; false outside of it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The photo of a camera where it lies in a frame, as 8-bit pixels; alpha 0 outside of it. Place: beside the
 // pictures of kernels in the viewer. Work: one thread a pixel. Shared memory: none. Reads the photo, writes B8G8R8A8.
 #version 460

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Replaces the colour of every projected splat by its depth, so that the blend that follows gives the mean depth of
 // a pixel as the ratio of its first two channels. Place: between tile ranges and blend, in the viewer alone.
 // Work: one thread a splat; the values of splats that are not visible are not read later. Shared memory: none.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as a checkpoint: a state or an Error, never a crash. The checksum is made right first,
 // so that what stands behind it is reached.
 #include <zlib.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as the files of a COLMAP model and as the head of a photo. The first byte picks which.
 #include <cstddef>
 #include <cstdint>

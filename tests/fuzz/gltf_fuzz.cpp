@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as glTF: a model or an Error, never a crash; what was read is written and read again.
 #include <cstddef>
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as a file of kernels and as the text of --kernel: kernels or an Error, never a crash.
 #include <cstddef>
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as .ksplat: a model or an Error, never a crash.
 #include <cstddef>
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // make_seeds CORPUS: a few small, whole files for each fuzzer, in CORPUS/FUZZER, of every format
 // and version; each is read once, so that a seed always reaches what comes after acceptance. The
 // fuzzers of tools/fuzz.sh start from them.

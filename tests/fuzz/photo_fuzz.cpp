@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as a photo: an image or an Error, never a crash, and pixels that nothing but the bytes
 // decides. The checksums of a PNG's chunks are made right first, so that what stands behind them is
 // reached.

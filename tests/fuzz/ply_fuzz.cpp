@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as PLY: a model or an Error, never a crash; what was read survives writing.
 #include <cstddef>
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as any splat file: a model or an Error, never a crash; its arrays fit together.
 #include <cstddef>
 #include <cstdint>

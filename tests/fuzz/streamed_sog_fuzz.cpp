@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as the lod-meta.json of a streamed SOG scene of one file: a model or an Error, never a
 // crash.
 #include <unistd.h>

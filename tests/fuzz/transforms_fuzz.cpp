@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Any bytes as transforms.json, cameras.json and camera_path.json.
 #include <cstddef>
 #include <cstdint>

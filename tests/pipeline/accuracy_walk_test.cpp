@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every accuracy setting on the device, images and gradients, against the double reference with the
 // same settings: what is chosen is computed, and the way back is the derivative of what was chosen.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb bench: the native loops against the shaders and against plain loops, and the command.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Mistakes of a caller of the library give an Error with a remedy, and leave the object usable.
 #include "engine/core/error.h"
 #include "engine/data/depth_io.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gradients of the camera: the device's in float against the double reference, and that against
 // central differences of its own pictures, for every kernel and footprint, with lenses and with the
 // projection's other effects.

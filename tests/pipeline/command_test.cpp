@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The built darb command, as a user runs it: exit codes, what errors name, and what info and
 // devices print.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb convert --splats, --share, --levels and --refine; and what merging is worth against
 // dropping.
 #include <algorithm>

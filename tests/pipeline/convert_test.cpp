@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Runs darb convert and darb info on scenes in every format: checks what is written, what is
 // printed, and that pictures agree between formats.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb check --dump: the arrays of a view, from the shaders and from the reference, against central
 // differences by the values that a PLY file stores.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The effects by hand on the command line: what is refused, and what a lens that is left out does.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Each effect on a scene that needs it and on one that does not: the plan is right for both, the
 // picture with auto equals that with all effects, and without the effect the first scene's picture
 // changes.

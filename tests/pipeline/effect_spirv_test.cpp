@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An effect that is off costs nothing: the SPIR-V of a pass with the effects' constants frozen and
 // optimised holds no instruction of it and reads none of its data.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb render without cameras: a turn around a scene, and a camera path of the viewer.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The forward walk as a whole: lists against the host, ties, invariances, empty and overfull
 // frames, and sizes at the limits.
 #include <algorithm>

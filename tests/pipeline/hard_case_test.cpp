@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every hard case on the device against double, image and gradients, in two kernels each.
 // `darb check --every-kernel` runs all.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The help of the built darb command, and what it says to words that it does not know.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The device's gradients of every parameter, for every kernel and footprint, against central
 // differences: of the device's own float images, which no formula of the reference takes part in,
 // and of the reference's images in double.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // No command overwrites what it reads, whatever the name; a full disk behind stdout is an error.
 #include <sys/stat.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A user's own kernels, given to each command.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb compare, psi and sim1d as a user runs them.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb train on photos without cameras: what it says without COLMAP, and how it calls it.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What darb writes, as public readers see it, and what a public writer writes, as darb sees it.
 // Needs node and the npm packages gltf-validator, @gltf-transform/core and
 // @playcanvas/splat-transform; see docs/formats.md.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The output folder of darb train over several runs: whose scene it holds, what --resume continues
 // with, and what --schedule writes into the settings of a run.
 #include <gtest/gtest.h>

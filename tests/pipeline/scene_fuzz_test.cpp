@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Random scenes with poison among their splats, through the whole walk: NaN, infinities, denormals
 // and numbers whose square overflows, in any parameter. No crash, no value that is not finite, no
 // message of the validation layers, and what is culled changes no bit of the others' image and

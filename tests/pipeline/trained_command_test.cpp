@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What darb does with a scene that it has trained: eval, render, check --dump, info, and resuming.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every way of the walk's passes gives equal bits where the tuning says so, and a run keeps the way
 // that it began with. walk_test compares both backward blends with double.
 #include <gtest/gtest.h>

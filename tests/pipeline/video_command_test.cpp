@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb train VIDEO, with a program named colmap that notes its calls and takes the scene's own
 // model as its result.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Views with gradients, as a user's own program requests them: against the double reference, for
 // one view and several added, an Adam step from them, and a caller's mistakes.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a caller may give besides a model (plain opacities and scales, colours, a loss on the
 // pixels' opacity) and what it may ask for (gradients by the background), against the double
 // reference and its central differences.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The whole walk on the device, splats to image and image gradient to every parameter, against the
 // double-precision reference, for every kernel, footprint and evaluation, and each of them with
 // every degree of the harmonics.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """darb.rasterize and its gradients against the double reference; scenes; what is refused."""
 
 import os

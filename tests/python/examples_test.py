@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """The examples in tiny form: each ends, prints figures and writes a picture."""
 
 import pathlib

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Random calls of the Python package: each returns or raises an exception with a text.
 
     fuzz_calls.py [--calls N] [--seed S] [--seconds T]

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """The module as it was built: it loads, draws a picture and trains for some iterations, in seconds.
 
 The other tests of the package take minutes and run apart; this one runs with every build.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """What a call of darb.rasterize takes beyond its frame: the table of docs/python.md.
 
     PYTHONPATH=build-python/python python3 tests/python/overhead.py [SPLATS]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What the tests of the Python package share: small scenes, cameras, and central differences."""
 
 import os

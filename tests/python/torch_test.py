@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """darb.torch.rasterize: gradients by autograd, and a fit with an optimizer of torch's."""
 
 import unittest

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """darb.Trainer: the bits of `darb train`, a loss of one's own, checkpoints; studies and plans."""
 
 import json

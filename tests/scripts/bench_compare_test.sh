@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # tools/lab/bench_compare.py on made-up results: what it calls faster, slower and noise.
 set -uo pipefail
 script=$(cd "$(dirname "$0")/../../tools/lab" && pwd)/bench_compare.py

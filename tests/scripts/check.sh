@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Sourced by tests of scripts: `folder`, which goes with the test, and `check`, which sets `failed`.
 # shellcheck shell=bash disable=SC2034 # who sources it ends with $failed
 folder=$(mktemp -d)

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Plants one violation of each kind in a tiny tree: check_style.sh must name it, and must pass the
 # tree without it. Prints one line per case.
 set -uo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # A specialization constant whose name no shader declares does not compile, and the compiler names the reason.
 #   constant_names.sh COMPILER BUILD
 set -euo pipefail

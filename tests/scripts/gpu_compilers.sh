@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # tools/lab/gpu_compilers.py: AMD's compiler takes every pass within the tracked table, and a worse pass is found.
 # Skips (77) where Mesa's drivers are not unpacked (tools/lab/gpu_compilers.py fetch) or darb is not built.
 #   gpu_compilers.sh BUILD

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Every script of tools/ says what it is for with --help, does nothing else then, and ends with 0.
 set -euo pipefail
 cd "$(dirname "$0")/../.."

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # tools/lab/hostile.sh: a case passes, and a command that spoils its input, writes an escape sequence or ends
 # by a signal is found, with the line that repeats it.
 set -uo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # The programs of docs/library.md, word for word, and those of examples/, built against an installed darb alone, and run.
 #   install.sh BUILD_FOLDER
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # A small scene as a web page in headless Chromium against darb render: rounded and exact, mouse, keys and touch, hostile
 # names, damage; and that a page too far from the truth is found. Skips without Chromium.
 set -uo pipefail

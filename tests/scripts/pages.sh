@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Man pages and completion name every command and every option that the help of darb lists.
 #   pages.sh BUILD
 set -euo pipefail

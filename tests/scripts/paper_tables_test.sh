@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # tools/lab/paper_tables.sh on a made-up ROOT: which scenes and sizes it hands to darb compare.
 set -uo pipefail
 script=$(cd "$(dirname "$0")/../../tools/lab" && pwd)/paper_tables.sh

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # What darb takes of glibc newer than 2.31 stands in tools/portable/old_glibc.c: else the portable archive can't be made.
 #   portable_symbols.sh DARB
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Two ranks that are apart: a network namespace each, with an address, a rate and a delay of its own.
 #   rank_network.sh BUILD
 # The scene has the bits of one rank, the wire carries what the run says that it sent, and a network that drops

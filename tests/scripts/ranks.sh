@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Several ranks by mpirun: a scene has the same bits on 1, 2 and 4 of them, and what goes wrong on one ends all.
 #   ranks.sh BUILD quick   two ranks and one, a resume in between
 #   ranks.sh BUILD long    strategies, kernels and effects on 1, 2 and 4; data sets, kills and stops

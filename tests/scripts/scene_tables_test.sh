@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # tools/lab/scene_tables.py on a made-up report: what it keeps and writes, kernels that failed included.
 set -uo pipefail
 # shellcheck source=check.sh

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # tools/setup.sh --dry-run on machines described by made-up os-release and dpkg-query answers.
 set -uo pipefail
 setup=$(cd "$(dirname "$0")/../../tools" && pwd)/setup.sh

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """A cable with a delay between two network namespaces: slow_cable.py NAMESPACE NAMESPACE DEVICE SECONDS
 
 A TUN device of that name in each; what enters one leaves the other after that time, in order. For kernels without

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # SwiftShader, the second driver that executes: darb check passes whole, and 50 iterations of training end within 0.1 dB of those on the
 # device that darb takes by itself. Skips (77) where Debian's chromium, which brings it, is not installed.
 #   swiftshader.sh BUILD

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Every control of the viewer's panels says what it does: after each stands a tip().
 set -euo pipefail
 cd "$(dirname "$0")/../.."

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The Adam step inside project_backward.comp against Adam in double, and what it must not change.
 #include "engine/reference/adam.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every way of the backward blend alone, blend_backward.comp and those with _team, _buckets and
 // _pixels, against the reference: one gradient for each splat-tile intersection.
 #include "tests/support/blend_scene.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // blend.comp and blend_records.comp alone against the blending of the reference, on splats set by
 // hand.
 #include "engine/plan/tuning_names.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Density control on the device against the decisions of the reference: which splats stay and grow,
 // where new splats come from and lie, and what happens to their moments.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The loss of measured depths: its pass against double; its gradient through blending, by every
 // parameter and by the camera, against the reference, which is tested against differences; and
 // smaller photos.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Smaller photos against area means in double.
 #include "engine/core/rng.h"
 #include "tests/support/shared_device.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The effects' own passes against double: exposure forward, backward and its step, the 3D smoothing
 // filter, and the depth image.
 #include "engine/core/rng.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The passes of exposure by a grid of maps against a picture in double and its finite differences.
 #include "engine/core/rng.h"
 #include "shaders/shared/effect_args.h"

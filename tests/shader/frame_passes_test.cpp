@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The small passes between projection and blending, each alone against the host: compact,
 // gather_counts, frame_groups, emit and tile_ranges.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The two ways of an optimiser step from one view: inside project_backward.comp, and with gradients
 // in buffers followed by adam_update.comp. For every kernel, each effect in training, and each rule
 // besides Adam.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The mean of the splats over iterations: compared with one in double, and what it holds and
 // returns.
 #include "trainer/step/iterate_average.h"

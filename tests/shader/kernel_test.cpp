@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // shaders/kernels on the device, through kernel_probe, against engine/kernels in double and against
 // the reference vectors: every kernel, footprint, evaluation and degree.
 #include <fmt/format.h>

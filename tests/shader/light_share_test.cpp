@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The light of splats in pictures, against the reference, which draws each splat alone white.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // shaders/loss against a brute force in double: values, gradient, sizes, mask, guards, repeats.
 #include "engine/raster/loss.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The passes of the strategy mcmc against double precision, one by one and together; and the law
 // that they serve: a splat replaced by several looks as it did.
 #include "trainer/growth/relocation.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The search for the nearest centre on the device, against the host's.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // project_backward.comp alone, with its gradients stored rather than applied, against the reference
 // for the same sums per intersection.
 #include "tests/support/backward_pass.h"

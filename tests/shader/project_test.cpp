@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // project.comp against the projection of the reference: every output, every reason to cull a splat,
 // and hard parameters.
 #include <limits>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // project.comp and project_backward.comp with effects compiled in, against the reference.
 #include "engine/reference/reference_render.h"
 #include "tests/support/backward_pass.h"

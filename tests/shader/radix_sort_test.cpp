@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // RadixSort against std::stable_sort: adversarial sizes, keys and key bits, both scatter
 // strategies, each with the offsets of the devices that take it, guard words behind all results.
 #include "engine/primitives/radix_sort.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scan against std::exclusive_scan: adversarial sizes and values, both team forms, guard words.
 #include "engine/primitives/scan.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Stereo on photos of a scene whose depth is known: a ball before two walls, all textured.
 #include <gtest/gtest.h>
 

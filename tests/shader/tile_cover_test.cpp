@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tiles that project.comp lists for a splat, against every pixel: no tile with a pixel above
 // the alpha cut-off is missing, and no listed cell lies outside the ellipse and its slack.
 #include <set>

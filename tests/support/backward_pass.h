@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // project_backward.comp alone: parameters and moments of a model on the device, sums of
 // intersections set by the test, and the reference's gradients for the same sums.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Projected splats set by hand, blended by blend.comp and back by blend_backward.comp, or by the
 // passes over buckets, alone, with the same lists for the reference.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // dL/d(camera) along the ten ways in which a camera can change: three turns about its own axes, the
 // translation, focal lengths, principal point.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The built darb command as a child that can be signalled and whose descriptors a test prepares.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Opens a page in headless Chromium, where it is installed, and reports what is found inside the
 // page.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/support/compare_arrays.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Comparison of arrays against a tolerance: prints case, index, expected, got and tolerance.
 //   EXPECT_TRUE(compare("d_position", expected, got, tolerance("gradient_float32"), 3));
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Compares images with each other, and with those of the reference.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kernels of the list and those whose shape each splat has of its own.
 #pragma once
 

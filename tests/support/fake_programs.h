@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Shell scripts in place of programs that the command calls, and a PATH on which they are found.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Both footprints, for loops.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What tests of gradients by a view share: a background, the reference's settings for it, and a
 // random dL/d(image).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // GuardedBuffer: device memory between guard words, poisoned until it is written, so that a test
 // sees what a pass writes outside its bounds and what it leaves unwritten.
 #pragma once

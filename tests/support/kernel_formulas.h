@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The nine kernels as the paper prints them (corrected), in plain double: written without a look
 // at engine/kernels, for comparison with it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The reference vectors of the kernels, computed elsewhere with 50 digits and rounded once to
 // double. The file is named by DARB_KERNEL_VECTORS, else shared/reference/kernels.json beside the
 // sources.

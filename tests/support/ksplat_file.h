@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A small .ksplat file, built by hand: two sections, the first with two splats (one full bucket of
 // one splat, and one that is not full), the second with one splat.
 #pragma once

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """LPIPS in PyTorch on random weights, as the truth of lpips_test.
 
     lpips_torch.py alexnet|vgg16 CHANNEL_DIVISOR OUT

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Depth files for the views of a tiny training, made from its true splats.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Two user-defined kernels: one whose polynomial meets the formula to float rounding, and one that
 // is replaced by its nearest polynomial, with terms that cancel and a jump at the edge.
 #pragma once

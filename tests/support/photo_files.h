@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PNG and JPEG files of every kind that cameras and programs write, by the libraries' own encoders.
 #pragma once
 

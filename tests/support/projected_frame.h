@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // project.comp alone on a model: its outputs read back, guard words checked, and the cover of each
 // splat as a list of tiles.
 #pragma once

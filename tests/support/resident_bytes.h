@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The memory that a process holds, as Linux reports it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Trainers that run to an iteration, and runs that stop there and resume from a file.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The built darb command, as a user runs it. For tests that tests/CMakeLists.txt gives
 // DARB_COMMAND.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Two shaders that compute the same thing by the same formulas give equal bits where the driver
 // rounds every operation. Drivers of GPUs may fuse a * b + c, in each shader on its own, as Vulkan
 // allows.

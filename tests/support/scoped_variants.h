@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tuning of a device for the length of a block.
 #pragma once
 

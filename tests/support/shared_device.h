@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One Device for all tests of a process, given back before main returns. A run under
 // DARB_VALIDATION=1 fails on any message of the validation layers.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Helpers for the tests of splat files: scenes whose values every format can hold, the error that a
 // reader throws, and hostile variants of a file.
 #pragma once

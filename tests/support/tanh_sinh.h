@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Tanh-sinh quadrature: an integrator for tests that shares nothing with engine/kernels, and does
 // not mind singular derivatives at the ends.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where the photo sets and scenes that some tests read lie.
 //   const auto folder = test_data_folder();
 //   if (!folder) GTEST_SKIP() << kNoTestData;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Options for the device of tests: those of the command, so that both compile a shader only once.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Lenses of every form for the cameras of random_scene.
 #pragma once
 

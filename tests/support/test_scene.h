@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Random scenes, by their short names in tests.
 #pragma once
 

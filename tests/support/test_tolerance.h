@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The table of tolerances, by its short name in tests.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One forward and backward pass of a scene on the tests' device, read back.
 #pragma once
 

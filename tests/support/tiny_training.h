@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A data set of a few small photos, rendered from random splats on the device, and options under
 // which a few dozen iterations go through every part of training.
 #pragma once

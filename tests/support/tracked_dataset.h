@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cameras on a ring around points with tracks; and the same cameras disturbed.
 #pragma once
 

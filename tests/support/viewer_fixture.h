@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A viewer without a window on a tiny scene.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A virtual display (Xvfb) with a program of this project on it. Mouse, keys and drops reach it as
 // a user's would; what it shows is read from Xvfb's frame buffer file.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What only a client of the X server can do for a test: drop a file on a window, as a file manager
 // does (the source's side of the XDND protocol, version 5), and set the display's dots per inch.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb train --blocks as a user runs it: the joined scene, a block that is killed or fails and is
 // resumed, and what is refused.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb cost: errors, fronts and predictions on known numbers; the whole measurement on small
 // scenes; and its pages in a browser.
 #include "tools/cost/accuracy_cost.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Measured depths in training: they bring depths closer, wait and shrink with their photos, and
 // change no bit where they are off.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Effects in training: probes for view-dependent colour, exposure, anti-aliasing, and runs that go
 // on bit by bit with all of them.
 #include "engine/plan/effect_plan.h"

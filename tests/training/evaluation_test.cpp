@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How a render is compared with a photo: alpha as transparency, and alpha as a mask.
 #include "trainer/run/evaluation.h"
 

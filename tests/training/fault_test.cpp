@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Training through the darb command while things break: a lost device, no memory, a full or
 // read-only disk, photos that change. Each ends with exit code 2 and a message that says what, why
 // and what to do, leaves the last checkpoint as it was, and --resume ends with the bytes of a run

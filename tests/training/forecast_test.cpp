@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // trainer/forecast: splats, time and memory before a run.
 #include "trainer/run/forecast.h"
 #include "trainer/growth/predicted_growth.h"

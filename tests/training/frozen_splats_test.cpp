@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Frozen splats in a training run: whatever the strategy, they are drawn and keep every bit, and a
 // run resumed from a checkpoint gives equal bits.
 #include <algorithm>

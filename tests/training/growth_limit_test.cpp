@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where splats stop growing in number, and how a run uses the memory that there is.
 #include "engine/core/error.h"
 #include "tests/support/resumed_run.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The hard cases trained: the losses of a few steps are those of the whole training loop in double
 // (render, loss, gradients and Adam of the reference), and density control and opacity resets leave
 // everything finite.

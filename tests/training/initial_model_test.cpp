@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What training starts from, for clouds that have no distances to measure.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The darb command, killed without warning while it trains, continues with --resume and ends with
 // exactly the bytes of an undisturbed run.
 #include <fcntl.h>

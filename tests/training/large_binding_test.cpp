@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The arithmetic of limits on devices that bind 128 MiB and 4 GiB, the least and the most that
 // Vulkan has: nothing wraps at 32 bits. No memory of these sizes is taken.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // trainer/memory_plan: the plan against what a device counted.
 #include "trainer/step/memory_plan.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Training with the splats in Morton order: it repeats, and a checkpoint goes on with the same
 // bits.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every option of the table does something: a short run with another value of it ends in another
 // state. An option that is read and ignored fails here.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Training with a loss of the caller's: Trainer::set_picture_gradient.
 #include "engine/core/error.h"
 #include "tests/support/resumed_run.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cameras trained beside the splats: by pictures alone, held by nothing but them.
 #include <algorithm>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a run leaves in its folder for later: paths that move with it, files that no run writes, a
 // failed report, and a start without memory. For the command.
 #include <fstream>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // engine/report, trainer/run_report: the page is well-formed, whole in itself, and stands strange
 // input.
 #include "trainer/run/run_report.h"

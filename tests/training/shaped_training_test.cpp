@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Training of kernels with a shape per splat: every splat learns its shape, under every strategy
 // and with anti-aliasing; a run repeats and resumes bit for bit.
 #include <gtest/gtest.h>

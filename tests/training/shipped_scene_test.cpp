@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Training on the scene that ships with the sources, held-out views as the measure.
 #include <nlohmann/json.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What ends or disturbs a training run from outside: signals, lost readers of its output, limits of
 // files, a second run in its folder. It saves, says so, and goes on where it can. For the command.
 #include <fcntl.h>

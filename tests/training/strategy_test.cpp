@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The strategies mcmc and budget in whole training runs: they repeat bit by bit, go on from a
 // checkpoint as if never stopped, keep to their counts and bring held-out pictures closer.
 #include "trainer/options/strategy.h"

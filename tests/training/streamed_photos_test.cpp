@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // trainer/photos, forecast: photos that wait on the host give equal bits in training, and are used
 // where memory requires it.
 #include <fmt/format.h>

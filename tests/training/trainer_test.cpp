@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Training runs of a few dozen iterations: they repeat bit by bit, go on from a checkpoint as if
 // never stopped, survive frames that need more room, and bring the loss down.
 #include "engine/core/error.h"

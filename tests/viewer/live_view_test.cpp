@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb train --view under Xvfb: pause, single steps, and a window that is closed while the run goes
 // on.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The viewer's pictures without a window: display modes, motion and rest, accuracy and effects.
 #include <gtest/gtest.h>
 

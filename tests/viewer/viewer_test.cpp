@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The viewer without a window: loading, editing, comparison, paths.
 #include "viewer/viewer.h"
 

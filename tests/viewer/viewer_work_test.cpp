@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The viewer without a window: exports, measurements and runs that are shown, and what happens to
 // them when the size, the scene or its edits change; edits that are not saved.
 #include <gtest/gtest.h>

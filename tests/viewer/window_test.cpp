@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The viewer in a real window under Xvfb, driven by mouse, keys and drops; what the display shows
 // is compared with a headless screenshot.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/bench/bench_report.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Results of `darb bench` as lines on a terminal and as JSON, both in the manner of Google
 // Benchmark, whose scripts can read the JSON. That library is not used: it keeps means where
 // quartiles of every pass are wanted, and plain numbers where passes and yardsticks have a

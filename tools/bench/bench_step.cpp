@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/bench/bench_step.h"
 
 #include <fmt/format.h>

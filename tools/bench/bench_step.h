@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One training step on a random scene and a photo of noise, in two ways: with Adam inside the
 // backward pass, or with gradients in buffers and a pass of its own. Each way has its own splats.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The cases of `darb bench`, with their names and what they need.
 #pragma once
 

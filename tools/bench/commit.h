@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The commit that the program was built from.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/bench/growth.h"
 
 #include <fmt/format.h>

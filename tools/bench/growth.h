@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How frame and iteration time grow with splats, pixels and splat-tile intersections on the random
 // scene of `darb bench`: curves with fitted exponents, as a table, JSON and a page of plots.
 #pragma once

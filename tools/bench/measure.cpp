@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/bench/measure.h"
 
 #include <fmt/chrono.h>

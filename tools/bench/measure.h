@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How `darb bench` measures a time: after a warm-up, with many samples, by the wall clock and the
 // passes' timestamps side by side, and noting what else the machine did meanwhile.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Forward and backward blending as plain C++ loops over vectors of floats, on as many threads as
 // the machine has cores: the yardstick of `darb bench` for what the blend passes could achieve on a
 // CPU. They walk the same tile lists, evaluate the same splat-pixels and give the same results as

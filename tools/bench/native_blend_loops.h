@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The loops of native_blend.cpp for one tile. Included once for each instruction set, in its own
 // namespace and for its own target, because a compiler splits vectors that a set does not have for
 // good where it first meets them. DARB_LANES: floats in a vector, 8 or 16. Vectors are passed by

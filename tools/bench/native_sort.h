@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sort and scan in plain C++ on one thread, with which those of the device are compared.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The scenes that `darb bench` measures on.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The blend passes of frames as training records them, measured beside the native loops on the same
 // tile lists in the same process; and the counts of those frames.
 #pragma once

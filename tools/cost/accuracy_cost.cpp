@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/cost/accuracy_cost.h"
 
 #include <fmt/format.h>

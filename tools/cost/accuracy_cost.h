@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What accuracy costs in time: every accuracy setting alone, and combinations of them, measured on
 // one model, one set of views and one device.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/cost/cost_report.h"
 
 #include <fmt/format.h>

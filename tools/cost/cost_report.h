@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The results of `darb cost` as a table, as JSON and as a page.
 #pragma once
 

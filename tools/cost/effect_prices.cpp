@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/cost/effect_prices.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What each effect of a plan costs on this device: the same work with it and without it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/cost/plan_subject.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a plan is made for: a data set to train on or a scene to render, with its plan and what
 // frames or iterations of it cost.
 #pragma once

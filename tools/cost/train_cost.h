@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the accuracy settings, and the other shortcuts and departures of training, cost and change:
 // gradients against double precision, time per iteration, seconds to given held-out PSNRs, and
 // final PSNR, over several seeds.

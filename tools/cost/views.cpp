@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/cost/views.h"
 
 #include <fmt/format.h>

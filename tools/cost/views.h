@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The views that `darb cost` measures on: those of a data set, with their photos, or eight around
 // the splats.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb bench [FILTER]: how long frames, training steps, sorts and starts take on this device, what
 // they work on, and how near that is to what the device can do.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb check: the numerical checks on the user's own device; and a view of a scene as arrays.
 
 #include <fmt/format.h>

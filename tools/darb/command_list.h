@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The subcommands of darb: each adds itself to the command line and leaves what to run.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb compare DATASET... -o OUT: kernels side by side, trained or found, as the paper's tables.
 #include "tools/darb/compare.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What `darb compare` is asked for, and the training runs that follow from it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb convert IN OUT: another format, frame, kernel, degree or part of a scene, or of several.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

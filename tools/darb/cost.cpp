@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb cost SCENE.ply [DATASET]: what each accuracy setting costs in time and buys in accuracy.
 #include <fmt/format.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/devices.h"
 
 #include <fmt/format.h>

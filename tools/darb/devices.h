@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What `darb devices` prints: every Vulkan device with its limits, which is chosen, and why; and
 // what commands want of the chosen one.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb eval SCENE.ply DATASET: PSNR and SSIM of the scene's pictures against the photos.
 #include <fmt/format.h>
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/flags.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // --accuracy and one flag for each accuracy setting, as the table of engine/plan names them.
 #pragma once
 

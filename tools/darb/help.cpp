@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/help.h"
 
 #include <fmt/format.h>

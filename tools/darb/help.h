@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How the commands show their help, and what they say to a command line that they do not take.
 #pragma once
 

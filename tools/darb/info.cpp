@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb info X: what a splat scene, or a data set, holds.
 #include <fmt/format.h>
 #include <algorithm>

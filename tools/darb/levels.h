@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Fewer splats by merging, for `darb convert`: one file of a count, or several levels, each refined
 // against photos where they are given.
 #pragma once

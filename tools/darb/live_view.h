@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb train --view: a window that follows a training run. It has a thread and a device of its own,
 // so no iteration, evaluation or compilation holds it up; the run draws its pictures between two
 // iterations, on its own thread and device.

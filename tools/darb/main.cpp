@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb: train, render and measure splat scenes. Exit codes: 0 done, 1 internal error, 2 bad usage
 // or input, or what the system refuses (a full disk); 128 and its number: a signal ended a run that
 // was saved.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/open_cameras.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cameras and data sets as subcommands open them: with what the readers note on stderr.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/outputs.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The one rule for every file that a command writes: never one that it reads.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/page_output.h"
 
 #include <fmt/format.h>

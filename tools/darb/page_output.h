@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb convert SCENE OUT.html: options of a web page, and the page.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb plan X: which effects a data set or a scene calls for, why, and what each costs here.
 #include <fmt/format.h>
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb psi: the correction factor of a kernel three ways, and how far its splats are from the true
 // projection.
 

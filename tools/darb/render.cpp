@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb render SCENE.ply --cameras X -o DIR: a PNG of each camera; without cameras a film of a path
 // or a turn.
 #include "tools/darb/render.h"

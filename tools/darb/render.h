@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Depth images beside the frames of darb render.
 #pragma once
 

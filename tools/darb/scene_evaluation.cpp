@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/scene_evaluation.h"
 
 #include <fmt/format.h>

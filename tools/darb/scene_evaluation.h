@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A scene's pictures measured against photos, at the photos' size and at others.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb sim1d: the paper's one-dimensional study of kernels.
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/stop_signals.h"
 
 #include <csignal>

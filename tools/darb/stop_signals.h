@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Signals that ask a run to save and end.
 #pragma once
 

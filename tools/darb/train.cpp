@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb train DATASET -o OUT: photos to a splat scene.
 #include <fmt/format.h>
 #include <algorithm>

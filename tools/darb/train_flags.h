@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The command line of `darb train`: the rows of trainer/job/request_options.h as flags, and the
 // few flags that say how the command shows its run.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/train_plan.h"
 
 #include <fmt/format.h>

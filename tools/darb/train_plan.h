@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What `darb train` prints before it trains: the data set, the device and a forecast.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What `darb train` says at the end of a run.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/darb/tune_flags.h"
 
 #include "engine/core/user_folders.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // --tune and --retune, and the choice of passes for commands that have neither.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb view SCENE: the interactive viewer; with --screenshot or --export it needs no window system.
 #include "tools/darb/view.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What darb view takes on the command line, and how a viewer starts from it.
 #pragma once
 

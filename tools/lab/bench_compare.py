@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Compares two results of `darb bench --json`: which cases became faster or slower, and which differences are noise.
 
     tools/lab/bench_compare.py BEFORE.json AFTER.json [--passes] [--least PERCENT] [--json FILE]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A copy of the sources with changes that stay out of the tree, and the command built from it: for scripts that measure
 what a change brings. No script of its own.
 """

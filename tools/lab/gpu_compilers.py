@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Compiles every pass with the compilers of GPUs that this machine does not have, and says what they make of them.
 
     gpu_compilers.py fetch DIR [--all]       unpacks Mesa's drivers below DIR: AMD's, with --all every vendor's

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Estimates the time of one training iteration on a GPU from what its compiler says of the passes.
 
     gpu_model.py PASSES.json [--gpu NAME]     PASSES.json: of `darb devices --passes --json`, or gpu_compilers.py run

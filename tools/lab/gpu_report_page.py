@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """The page of tools/gpu_report.sh: gpu_report_page.py FOLDER [PHOTOS] writes FOLDER/index.html from what the steps left.
 
 Takes paths of this machine out of the steps' texts. Text from files is escaped.

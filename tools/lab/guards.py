@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """The guards of the hard cases: which line of the sources holds each, and which test watches it.
 
     tools/lab/guards.py check               strings and tests exist, docs/hard_cases.md says the same

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """What the next attribute of splats takes: adds one, `glow`, a float that is added to all three channels of the colour,
 to a copy of the sources. It is trained, kept by density control, saved, resumed and compared with the reference in double.
 

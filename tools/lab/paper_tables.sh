@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # The paper's Tables 1 and 2: its 13 scenes, 5 kernels, 7,000 and 30,000 iterations, at the sizes of 3DGS:
 # outdoor scenes of Mip-NeRF 360 from images_4, indoor ones from images_2, the others at most 1,600 px wide.
 #   tools/lab/paper_tables.sh ROOT OUT [options of darb compare...]
@@ -6,10 +7,10 @@
 # kitchen bonsai truck train drjohnson playroom. Missing ones are named and left out. Runs again go on. The schedule is
 # that of 3DGS, as the paper's, unless --train-options names another --schedule.
 set -euo pipefail
-case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
 if [[ $# -lt 2 ]]; then
-    sed -n '2,8s/^# \{0,1\}//p' "$0" >&2
+    sed -n '3,9s/^# \{0,1\}//p' "$0" >&2
     exit 2
 fi
 root=$1 out=$2

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """What it costs that training repeats bit by bit: gradients of a splat-tile intersection have a slot of their own and are
 summed in order. Builds, in a copy of the sources (build-atomics), the other way: float atomics into one sum a splat;
 trains both in turn on the shipped scene, and prints the milliseconds of the two passes that differ.

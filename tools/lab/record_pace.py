@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """The pace of training runs as the test of the time left wants it, from their output folders.
 
   tools/lab/record_pace.py OUT NAME...    writes tests/unit/trainer/pace/NAME.json from OUT/NAME/run.jsonl

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Disturbs the cameras of a COLMAP project, and measures how far others are from its own.
 
     refined_cameras.py disturb DATASET OUT PX [--seed N] [--no-tracks]

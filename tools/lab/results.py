@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """How the laboratory writes its results: JSON with a row a line, so that a file is short and a change of it is read."""
 
 import json

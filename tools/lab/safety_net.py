@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Hashes of what short training runs, pictures and converted files leave: a change that only moves code keeps them all.
 
     safety_net.py record FILE [--darb PATH] [--quick] [--only TEXT]

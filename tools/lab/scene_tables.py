@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Keeps what `darb compare` found on data sets in assets/results/scenes_lavapipe.json and writes its tables into
 docs/experiments/kernels_on_photos.md.
 

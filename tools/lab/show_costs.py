@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Tables of what accuracy costs on some scenes (docs/experiments/accuracy_cost.md) and of what effects each data set calls
 for (docs/experiments/effect_costs.md).
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Trains ITERATIONS (default 10,000) on the shipped scene, with density control to the end under a cap of splats, and an
 # evaluation, a checkpoint and a scene every tenth; samples the process's memory every second, and fails unless the last
 # fifth of the run holds at most 2 % more than the fifth before it.
 #   tools/lab/soak.sh [ITERATIONS]
 set -euo pipefail
-case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/../.."
 
 darb=${DARB:-build/darb} # the command under test

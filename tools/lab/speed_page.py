@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Writes the tables of docs/speed.md from results of `darb bench`: every case with its most expensive passes and their shares of
 the roofline, and, where there is one of `darb bench --growth`, time against splats, pixels and intersections.
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # The strategies adc, mcmc and budget side by side on data sets: the time that each takes to adc's final PSNR on
 # held-out views, and its final PSNR at adc's number of splats, which is the budget of the two others. STRATEGY_P is a run
 # of P percent of the iterations, whose rates and growth are made for it.
@@ -8,9 +9,9 @@
 # OUT/SET/STRATEGY/seedN: finished ones are kept, one that was interrupted goes on. Times are those of training alone;
 # run it on a quiet machine. Beside the table all evaluations go to OUT/strategies.json. DARB= names another command.
 set -euo pipefail
-case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
-usage() { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+usage() { sed -n '3,10s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 fail() { echo "strategies.sh: $*" >&2; exit 2; }
 out=strategies iterations=30000 seeds=0 evaluations=30 sets=() options=()
 strategies="adc_40 mcmc budget budget_60"

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Measures how easy the tree is to change: sizes, signatures, members, and the files that a change of each kind touches.
 
     structure.py [--json] [ROOT]

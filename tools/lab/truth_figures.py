@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Figures of how far the numbers can be trusted: collected from what the checks print, shown in docs/experiments/float32.md.
 
     tools/lab/truth_figures.py WHAT=FILE...     takes new figures into assets/results/truth_lavapipe.json and leaves the

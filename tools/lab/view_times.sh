@@ -1,10 +1,11 @@
 #!/bin/sh
+# SPDX-License-Identifier: MIT
 # tools/lab/view_times.sh OUT.json SCENE...: frame times of darb view at 1280x720 in a window, for each
 # scene; on a virtual display where there is none. On a machine that does nothing else.
 # The virtual display keeps its memory: else it takes fresh pages for each picture of 3.7 MB, which
 # on some virtual machines costs 15 ms a frame.
 set -eu
-case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 if [ $# -lt 2 ]; then
     echo "usage: tools/lab/view_times.sh OUT.json SCENE..." >&2
     exit 2

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/paper/approximate1d.h"
 
 #include <time.h>

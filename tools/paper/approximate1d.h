@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The paper's one-dimensional study (its Figures 5 to 11): signals are approximated by sums of N
 // kernels whose positions, widths and weights are fitted by Adam on the mean squared error.
 #pragma once

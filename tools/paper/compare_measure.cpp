@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/paper/compare_measure.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a comparison measures on finished runs: LPIPS of held-out pictures, and blending.
 #pragma once
 

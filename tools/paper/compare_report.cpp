@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A comparison as text and as JSON.
 #include "tools/paper/compare_report.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Finds where the pictures of two kernels differ most in their error against the photo, in both
 // directions.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/paper/compare_runs.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Training runs of several kernels on several data sets, side by side: what is read from their
 // output folders, what is measured on their scenes, and the page that shows it all.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/paper/compare_share.h"
 
 // NLOHMANN_DEFINE_TYPE looks for these by the type's namespace.

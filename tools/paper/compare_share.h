@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sends finished runs from one rank to another.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Medians over the seeds of a comparison, and which kernel is best.
 #pragma once
 

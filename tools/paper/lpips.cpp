@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/paper/lpips.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // LPIPS, the learned perceptual distance of two pictures (Zhang et al. 2018, version 0.1), on the
 // CPU, with weights from files that the user provides.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Copied from the supplement's tables as they are printed, suspect cells included (docs/paper.md).
 #include "tools/paper/paper_numbers.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The figures that the paper prints per scene: DARB-Splatting, arXiv 2501.12369, supplementary
 // Tables 1 and 2. One RTX 4090, single runs.
 #pragma once

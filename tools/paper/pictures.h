@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Small pictures inside HTML pages: fields of numbers as images, and rows of them with captions.
 #pragma once
 

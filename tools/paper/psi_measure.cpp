@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/paper/psi_measure.h"
 
 #include <algorithm>

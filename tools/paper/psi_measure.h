@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The correction factor psi of a kernel in three ways: the paper's experiment on a grid, the exact
 // ratio of moments, and the best scale by least squares; and how far each footprint is from the
 // true projection. Source: DARB-Splatting, arXiv 2501.12369, section on splatting and its

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The results of `darb psi` as a table, as JSON and as a page of plots.
 #pragma once
 

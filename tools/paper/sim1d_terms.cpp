@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Compiled with -O3 -fopenmp-simd -fno-math-errno -fno-trapping-math (tools/CMakeLists.txt).
 // The profiles are the twins of engine/kernels/kernel_coefficients.h without branches, so that four
 // or more samples go through one instruction.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The inner loops of the one-dimensional study: a sum of kernels on a row of samples, its squared
 // error, and the gradient. Plain float arrays, which compilers vectorise.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/paper/study1d.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The whole one-dimensional study: every signal, kernel, number of primitives and seed.
 #pragma once
 

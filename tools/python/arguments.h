@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What Python gives a function, taken with care: each wrong type, shape, order, device and number
 // is an Error that names the argument and says what it takes. Arrays are views: the floats stay
 // where they are, and are read while the holder lives.

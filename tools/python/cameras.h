@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cameras as gsplat has them: viewmats [C,4,4], world to camera, and Ks [C,3,3].
 #pragma once
 

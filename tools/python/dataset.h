@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb.Dataset: photos with their cameras and the sparse points.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/python/device.h"
 
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A device as Python holds it: one lock, under which a single call uses its queue, and the
 // renderers that calls with arrays make, kept for the next call of the same kind.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels and footprints by name, or as an object.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // _darb: what the package darb (tools/python/darb) is made of. Functions take their arguments in a
 // dict where Python's side has names and defaults for them; every mistake is darb.Error.
 #include <pybind11/pybind11.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb.rasterize: arrays or a scene to pictures, and back to gradients.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb.reference: the same pictures and gradients in double precision, by the code that is the
 // truth of darb's own tests (engine/reference). Slow, on the host.
 #include "tools/python/reference.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The double reference, for tests.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/python/scene.h"
 
 #include <fmt/format.h>

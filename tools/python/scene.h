@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb.Scene: a splat file in memory, its attributes as arrays, and its splats on the device for
 // as long as they do not change.
 #pragma once

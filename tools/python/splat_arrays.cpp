@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/python/splat_arrays.h"
 
 #include <fmt/format.h>

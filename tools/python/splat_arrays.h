@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The splats of a call, given as arrays.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb.psi, darb.sim1d and darb.plan: what the commands of these names write as JSON.
 #include "tools/python/study.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb.psi, darb.sim1d and darb.plan.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The options of `darb train` as keywords.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/python/trainer.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // darb.Trainer: `darb train` step by step, with the same options and the same bits.
 #pragma once
 

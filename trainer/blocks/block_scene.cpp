@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/blocks/block_scene.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a block is trained on and what is left of it: its photos, the splats that it begins with
 // and its frozen surroundings, the cut to its cell, and the joined scene.
 #pragma once

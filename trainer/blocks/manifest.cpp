@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/blocks/manifest.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // blocks/manifest.json of a run in blocks: what it was asked for, its cells, and how far each part
 // has come. --resume goes on from it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/blocks/partition.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The cells of a scene that is trained in blocks: rectangles on the ground plane that together
 // cover all of it, with about as many points in each.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/blocks/run_blocks.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A run in blocks: a coarse model of the whole, then one part of the ground after the other in
 // bounded memory, each with frozen surroundings, and one scene of all. In OUT:
 //   blocks/manifest.json  blocks/coarse/  blocks/COLUMNxROW/   runs of their own

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Strategy adc: clone, split and prune by the screen gradient, reset opacities. Source: 3DGS,
 // section 5, with graphdeco's schedule.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Strategy budget: adc steered to a number of splats. Those with the largest gradients on the
 // screen grow, however small these are, as many as bring the count on its way.
 #include <cfloat>

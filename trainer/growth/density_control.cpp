@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/growth/density_control.h"
 
 #include <algorithm>

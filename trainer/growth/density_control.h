@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Density control `adc` on the device: clone, split and prune between iterations, and the opacity
 // reset. Source: 3DGS section 5 with graphdeco's schedule; split offsets come from the kernel's own
 // density.

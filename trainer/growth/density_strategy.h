@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // DensityStrategy: how splats come, go and move while a run goes on. A strategy is one file, which
 // defines its row (strategy_row.h) and what a run makes of it, and its name in strategy_list.h.
 #pragma once

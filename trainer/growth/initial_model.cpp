@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/growth/initial_model.h"
 
 #include <fmt/format.h>

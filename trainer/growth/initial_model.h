@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The splats that training starts from: one at each point of the cloud, or random ones where the
 // cameras look.
 #pragma once

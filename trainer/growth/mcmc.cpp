@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Strategy mcmc: dead splats move onto live ones, the number grows by 5 % a round, positions get
 // noise. Source: 3DGS-MCMC, arXiv 2404.09591.
 #include <algorithm>

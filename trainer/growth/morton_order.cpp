@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/growth/morton_order.h"
 
 #include "engine/primitives/groups.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Splats in the order of a space-filling curve: those that lie beside each other in the scene lie
 // beside each other in memory, so that what a view does not see comes in long runs. The sort is
 // stable and the grid is the caller's: the order repeats. A picture changes by it only where

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/growth/predicted_growth.h"
 
 #include <algorithm>

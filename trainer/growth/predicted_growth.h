@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a run will grow to, by rule: splats, intersections and the degree of colour. Nothing is
 // measured here; forecast.h measures the times that belong to it.
 #pragma once

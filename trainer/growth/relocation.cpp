@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/growth/relocation.h"
 
 #include <algorithm>

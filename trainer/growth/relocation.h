@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Relocation: a round of density control and noise on the device. Dead splats move onto live ones,
 // new ones grow there, and nearly transparent ones wander. Source: 3DGS-MCMC, arXiv 2404.09591,
 // with the relocation of any kernel (engine/kernels/relocation_table.h).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/job/job.h"
 
 #include "engine/plan/tuning_names.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // TrainJob: what becomes of a TrainRequest on this data set and device, as data: options, effects
 // with their reasons, start, strategy, notes. Nothing here prints; run() trains it.
 #pragma once

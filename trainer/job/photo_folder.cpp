@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/job/photo_folder.h"
 
 #include <fmt/format.h>

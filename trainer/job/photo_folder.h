@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A folder of photos without cameras, for COLMAP.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/job/request.h"
 
 #include <fmt/format.h>

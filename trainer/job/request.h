@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // TrainRequest: everything that was asked of a training run, with nothing resolved. The command
 // line, Python, `darb compare`, `darb cost` and programs that use the library make one, by its
 // members or by the names of options (request_options.h); resolve() in trainer/job/job.h turns it

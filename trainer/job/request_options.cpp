@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/job/request_options.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The options of a training run by name, in one table: the flags of `darb train` with their help,
 // the keywords of Python and the entries of OUT/request.json are made from it. The rows of
 // trainer/options/option_table.h are among its rows.

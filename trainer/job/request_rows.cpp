@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The rows of request_options.h, in the order of `darb train --help-all`.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/job/scene_file.h"
 
 #include <fmt/format.h>

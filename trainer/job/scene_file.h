@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The scene that a command line names: a splat file, or the output folder of a training run.
 #pragma once
 

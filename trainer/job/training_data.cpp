@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/job/training_data.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a request trains on: a data set, photos whose cameras COLMAP finds first, or a video whose
 // sharpest pictures ffmpeg takes before that.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The rows of option_table.h, in the order of `darb train --help-all`.
 #include <nlohmann/json.hpp>
 

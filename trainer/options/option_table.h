@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The options of a training run, one row each. A row makes the flag of `darb train` with its help
 // and its limits, the value in the schedule of 3DGS, and the place in the text of the settings,
 // which checkpoints hold and a resumed run must repeat. A new option is a member of TrainOptions

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // TrainOptions: everything that decides a training run, as it was asked for. What is absent takes
 // its default by the length of the run, the kernel and the strategy: Schedule has what comes of it.
 #pragma once

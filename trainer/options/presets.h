@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Lengths of a run by name: iterations and the width of the photos, for those who do not want to
 // choose these.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/options/schedule.h"
 
 #include <fmt/format.h>

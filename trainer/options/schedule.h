@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Schedule: what a training run does at which iteration. It is resolved once from TrainOptions,
 // where what is absent takes its default by the length of the run, the kernel and the strategy;
 // from then on it only answers. It knows no scene: lengths are in scene extents, photos come as

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The strategies by which splats grow in number, by name, with what is known of them before a run.
 // Their table is density/strategy_list.h; each is one file of density/.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Held-out views: their metrics, and their pictures beside the photos.
 #pragma once
 

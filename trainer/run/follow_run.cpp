@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/run/follow_run.h"
 
 #include <fmt/format.h>

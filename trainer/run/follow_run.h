@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the ranks of a training run share at its start and before each step, and the run of a rank
 // that is not the first: it trains, and leaves files and words to that one.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/run/forecast.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Forecast: what a training run will take on this device, from the data set's size and a few
 // measured iterations.
 #pragma once

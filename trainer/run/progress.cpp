@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/run/progress.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Progress on stderr: one line rewritten in place on a terminal, a plain line now and then
 // elsewhere.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A whole training run: photos in, output folder out. Folder layout as the ecosystem's viewers
 // expect:
 //   point_cloud/iteration_N/point_cloud.ply  cameras.json  cfg_args

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/run/run_folder.h"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The output folder of a run: one run at a time in it, nothing of an earlier one lost, and never
 // the folder of the photos.
 #pragma once

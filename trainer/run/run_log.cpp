@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/run/run_log.h"
 
 #include <sys/resource.h>

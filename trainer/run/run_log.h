@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // RunLog: run.jsonl (an event a line, flushed), metrics.json and report.html of one output folder.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The report of a training run: one HTML file without outside resources, with curves, times per
 // pass, settings and held-out pictures. Readable on bright and dark screens and in print.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/run/time_left.h"
 
 #include <algorithm>

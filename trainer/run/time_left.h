@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is left of a run: the pace that was measured, on through as much of the forecast growth as
 // the run shows it to have. In tests/unit/trainer/time_left_test.cpp the estimate at 24, 50 and 75
 // % of a run is within 1.5 times of the truth where the forecast is right, where the growth does

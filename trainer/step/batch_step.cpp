@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/batch_step.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The step of a batch: the views one after the other into a tree of gradients, then one step of the
 // optimizer of their mean. Of several ranks each does its aligned part of the views; their sums are
 // added in the same tree, by all of them, and all make the step.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/camera_refinement.h"
 
 #include <fmt/format.h>

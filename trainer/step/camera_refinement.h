@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // CameraRefinement: poses of the training photos, and the intrinsics that they share, trained
 // beside the splats. The gradient through the picture comes from the device; the reprojection of
 // tracks anchors it. Adam, a camera and a group of intrinsics at a time, in coordinates of which a

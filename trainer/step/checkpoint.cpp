@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/checkpoint.h"
 
 #include <zlib.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Checkpoints: everything a run needs to go on bit-equal. One file: "DARBCKPT", version, a
 // CRC-32 of the rest, a JSON header with the sizes and the settings, float32 arrays. Written
 // atomically.

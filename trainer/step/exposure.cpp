@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/exposure.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Per-photo exposure in training: an affine map of colours a photo, or a bilateral grid of them,
 // between picture and loss, trained by Adam beside the splats. Off in pictures for evaluation. The
 // mean of all maps stays the identity. It maps what the splats show and leaves the background as it

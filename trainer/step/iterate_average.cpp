@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/iterate_average.h"
 
 #include <fmt/format.h>

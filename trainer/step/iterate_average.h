@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // IterateAverage: the mean of the splats over iterations of a run (Polyak and Juditsky 1992). Steps
 // that are too large to settle scatter around where they lead; their mean does not.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/memory_plan.h"
 
 #include <algorithm>

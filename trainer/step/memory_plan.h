@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // MemoryPlan: how much device memory a training run takes. Exact where splats, intersections and
 // degree are given: it adds up the lists from which the parts of the trainer make their buffers.
 // What a run will come to is another matter, see forecast.h.

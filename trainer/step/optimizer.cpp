@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/optimizer.h"
 
 #include <algorithm>

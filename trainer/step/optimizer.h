@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Optimizer: the schedule's rates and the regularisers of an iteration as the step of Adam that the
 // backward pass makes, in the units of the scene.
 #pragma once

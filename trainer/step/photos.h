@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // TrainingPhotos: photos and cameras on the device, whole or, while the resolution ramp lasts, with
 // their sides divided. Photos that do not fit wait on the host: a step copies its own to one of two
 // places on the device, and the next one's to the other.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/probe.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // DegreeProbe: whether colour that changes with the view pays, found out by trying. A probe forks
 // the state of a run: some iterations without and with another degree of harmonics, each from the
 // same state, compared on training photos that both leave out. Then the run goes on from where it

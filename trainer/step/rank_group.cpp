@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/rank_group.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // RankGroup: the ranks of a training run, and what they agree on: that they train the same, when to
 // stop, that their splats are equal.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/smoothing.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The 3D smoothing filter of Mip-Splatting in training: its deviations on the device, and splats
 // with the filter worked in for files.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // TrainingStep: one training view forward, its loss, and back into the splats. Steps overlap: run()
 // submits one while the one before still runs, and the host reads a step's result after the next
 // is on its way. A step whose intersections did not fit changes nothing, nor do those behind it:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Trainer: one training run on one device, free of globals. A loop over parts that know nothing of
 // each other: ViewOrder says which view, Schedule and Optimizer at which rates, TrainingStep trains
 // on it, a DensityStrategy adds and removes splats between steps. step() submits an iteration while

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "trainer/step/trainer_state.h"
 
 #include <fmt/format.h>

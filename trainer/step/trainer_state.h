@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // TrainerState: all that training changes, on the host: what a checkpoint holds, and what a probe
 // forks and comes back to.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Tools, selection, undo, merge, save.
 #include <imgui.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pictures side by side: the choice of kernels, the lines between panes, and what each pane shows.
 #include <imgui.h>
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The side panel as a whole, and what is drawn over the picture: progress, errors, help.
 #include "viewer/panels/panels.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The sections of the side panel, each one function; and helpers that they share.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is open, and how it is displayed.
 #include <imgui.h>
 #include <string>

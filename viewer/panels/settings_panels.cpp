@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Accuracy settings and effects as switches, each choice with its measured time and error beside
 // it, each effect with the reason that the plan gives.
 #include <imgui.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 const scene = JSON.parse(document.getElementById("scene").textContent);
 const nextFrame = () => new Promise(done => setTimeout(done, 0));
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cameras: eye, axes (right, down, forward in the world) and the lens of a pinhole, in px of width x height.
 const add = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // WebGL 2: projects all splats into two textures of integers, then blends a quad a splat, front to back.
 const batch = 1024;  // splats an instance
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is on show: the camera, its order of splats, and a picture whenever either changes. In motion a picture has
 // a share of the window's pixels each way, and the splats of a level: about a quarter of those of the one before.
 const paces = [[1, 0], [0.7, 0], [0.5, 0], [0.5, 1], [0.35, 1], [0.25, 1], [0.25, 2]];

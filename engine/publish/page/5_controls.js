@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pointers (mouse, pen, fingers), wheel and keys.
 const keysDown = new Set();
 const keyAxis = {KeyD: [0, 1], KeyA: [0, -1], KeyE: [1, -1], KeyQ: [1, 1], KeyW: [2, 1], KeyS: [2, -1], ArrowUp: [2, 1], ArrowDown: [2, -1]};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The panel, loading, and the hook for tests.
 const element = id => document.getElementById(id);
 const opened = performance.now();

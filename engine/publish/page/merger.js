@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // For pictures in motion on slow devices: splats that lie side by side on a Morton curve become one that keeps opacity
 // times area, mean, second moment and harmonics, as engine/scene/merge_splats.h has it of better chosen ones.
 const together = 4;  // splats at most

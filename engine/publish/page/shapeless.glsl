@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // In the place of shaders/kernels/shaped.glsl: pages draw no kernels whose shape each splat has of its own.
 const bool SHAPED = false;
 const int BLENDED = 0;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The worker: splats by the depth of their centres, front to back, equal depths by their number. Another one merges.
 const levels = [];  // of splats: their positions, and room to sort
 const counts = new Uint32Array(3 << 11);

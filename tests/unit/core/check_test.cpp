@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // DARB_CHECK and Error: what a developer and a user read when something is wrong.
 #include "engine/core/error.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reading and atomic writing, with the failures that a long run meets: full disk, read-only disk.
 #include "engine/core/files.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/core/image.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How much memory is free, according to made-up Linux files: on a machine, and in control groups of
 // both versions, as in a container.
 #include "engine/core/memory.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/core/rng.h"
 
 #include <gtest/gtest.h>

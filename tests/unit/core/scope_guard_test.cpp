@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a scope restores, and which failure is reported where restoring fails, too.
 #include "engine/core/scope_guard.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How names from files appear on a terminal and in Python source.
 #include "engine/core/text.h"
 

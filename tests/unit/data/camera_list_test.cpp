@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/camera_list.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/colmap.h"
 
 #include <gtest/gtest.h>

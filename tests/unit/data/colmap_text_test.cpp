@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // COLMAP text models, and the real models in both forms.
 #include <gtest/gtest.h>
 

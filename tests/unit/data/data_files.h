@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The real data sets, scratch folders and hand-made files for reader tests.
 #pragma once
 

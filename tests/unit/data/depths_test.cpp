@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Measured depths beside the photos: files, names, sizes, lenses, the scale of a scene.
 #include "engine/data/depths.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which views are held out: every N-th, an arc, both, and what a source itself states.
 #include "engine/data/hold_out.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Masks beside the photos of COLMAP models and transforms files, under every name that is used.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/metrics.h"
 
 #include <gtest/gtest.h>

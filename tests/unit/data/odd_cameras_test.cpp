@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Notes on cameras that cannot be right.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Untrusted photos: every kind of PNG and JPEG, and files that are cut off, damaged or made to
 // break a decoder.
 #include <gtest/gtest.h>

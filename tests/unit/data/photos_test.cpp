@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From files to pixels: formats, EXIF, masks, scaling, many at once.
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The extent of a scene: that of the training views, and a finite value where cameras say nothing.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The real data sets load: counts, sizes, poses that see the points, and photos.
 #include <gtest/gtest.h>
 

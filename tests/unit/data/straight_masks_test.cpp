@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Masks of photos that COLMAP undistorted, checked against its lens written out.
 #include "engine/data/masks.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bundle adjustment: cameras and points that tracks determine come back; those that fit stay.
 #include "engine/data/track_adjustment.h"
 

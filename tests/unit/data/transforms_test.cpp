@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/data/transforms.h"
 
 #include <gtest/gtest.h>

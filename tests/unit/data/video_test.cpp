@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which pictures of a video are kept.
 #include "engine/data/video.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Commands and Pipeline: fills, copies, dispatches, barriers under validation, timestamps.
 #include "engine/gpu/commands.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Device: listing, selection, buffers, budgets and injected faults.
 #include "engine/gpu/device.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The shader polynomials, evaluated in float32 on the CPU, against double.
 #include "engine/kernels/kernel_coefficients.h"
 #include "tests/support/footprints.h"

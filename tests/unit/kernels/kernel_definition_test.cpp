@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels given by functions: the family written anew, profiles that are refused, and the registry.
 #include "engine/kernels/kernel_definition.h"
 

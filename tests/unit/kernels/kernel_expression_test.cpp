@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels as expressions, lists of kernels on a command line, and the places of errors.
 #include "engine/kernels/kernel_expression.h"
 

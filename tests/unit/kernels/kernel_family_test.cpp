@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The family against the printed formulas, closed forms and printed figures.
 #include "engine/kernels/kernel_family.h"
 

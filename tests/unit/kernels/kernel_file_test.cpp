@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels in JSON files and tables: what they give, and that no file causes a crash.
 #include "engine/kernels/kernel_file.h"
 

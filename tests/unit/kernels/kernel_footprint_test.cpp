@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The exact footprint: line integrals of the kernels.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Kernels with more than one pulse: raised cosine and the modulus of sinc with their rings.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // reach: where opacity * w falls below the cut-off.
 #include <gtest/gtest.h>
 

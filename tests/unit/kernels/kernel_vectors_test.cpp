@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // engine/kernels against vectors computed with 50 digits.
 #include "tests/support/kernel_vectors.h"
 

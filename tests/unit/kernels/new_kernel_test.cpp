@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A kernel that the product does not have, added by one row: everything else must follow.
 #include <gtest/gtest.h>
 

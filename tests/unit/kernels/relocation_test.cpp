@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Relocation factors and nearest Gaussians against printed figures, closed forms and brute force.
 #include "engine/kernels/relocation_table.h"
 

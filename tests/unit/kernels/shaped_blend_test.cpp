@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Blends of two kernels with a weight per splat: both ends, derivatives and integrals.
 #include <gtest/gtest.h>
 

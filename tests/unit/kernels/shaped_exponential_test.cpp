@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kernel generalized_exponential: closed forms against differences and integrals, the bound of
 // its slope at the centre, and the Gaussian that it starts at.
 #include <gtest/gtest.h>

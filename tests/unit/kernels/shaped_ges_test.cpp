@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kernel ges_published: its program's factor, what that does to lengths, and the Gaussian that
 // everything else equals.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kernel with a shape per splat: closed forms against differences and integrals, and at the
 // start shape against the row of the family.
 #include "engine/kernels/shaped_kernel.h"

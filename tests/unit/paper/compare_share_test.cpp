@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Runs of a comparison, sent between ranks.
 #include "tools/paper/compare_share.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Comparisons: which runs count as done, medians and marks, crops, and the paper's printed numbers.
 #include "tools/paper/compare_runs.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // LPIPS against PyTorch with random weights (skips where PyTorch is missing), against convolutions
 // by definition, and what it says of files that do not fit.
 #include "tools/paper/lpips.h"

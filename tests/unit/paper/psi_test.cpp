@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The correction factor: printed values, closed forms, and the paper's experiment.
 #include "tools/paper/psi_measure.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The one-dimensional study: profiles against double precision, gradients against differences, and
 // fits whose answer is known.
 #include "tools/paper/approximate1d.h"

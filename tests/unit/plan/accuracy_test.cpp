@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The table of accuracy settings: names, presets, and what the errors say.
 #include "engine/plan/accuracy.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The device's rates, and the work of passes as counts scale.
 #include "engine/plan/roofline.h"
 

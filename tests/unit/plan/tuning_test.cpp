@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // engine/plan/tuning_names, tuner: names, what a device allows, the record on disk,
 // what wins.
 #include "engine/plan/tuning_names.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where the floats of splats lie in a buffer of the device: what comes back is what went there, and
 // neighbours in a block are neighbours in memory.
 #include "engine/raster/attribute_rows.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Adam against its sums written out, and the hard cases of its first steps.
 #include "engine/reference/adam.h"
 

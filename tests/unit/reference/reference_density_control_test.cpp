@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Clone, split and removal: each rule of the schedule on one splat, then the cap.
 #include "engine/reference/reference_density_control.h"
 

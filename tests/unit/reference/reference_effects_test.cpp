@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gradients of the projection's effects (lens, 3D smoothing filter and anti-aliasing) against
 // central differences of a random linear function of the projection's results.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tables of the inner loop against the kernel family they are made from.
 #include "engine/reference/kernel_table.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The loss against an SSIM written out window by window, and its gradient against differences.
 #include "engine/reference/reference_loss.h"
 

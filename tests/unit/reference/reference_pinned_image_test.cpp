@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Signs, orders and axes of the reference, pinned by tiny images worked out by hand.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Projection of one splat: culls, clamps and their gradients, needles.
 #include "engine/reference/projection.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every gradient of the reference against central differences of its own forward walk, for every
 // kernel and footprint, under random weights on colour, alpha and depth. A parameter whose two
 // renders blend a different set of samples sits on a cut-off: it is counted, and not compared.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tiled walk against a plain one without tiles, and the invariants of an image.
 #include "engine/reference/reference_render.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scenes of one or a few splats whose image can be worked out by hand, and finite differences.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Spherical harmonics: orthonormality pins the constants, axes pin order and signs.
 #include "engine/reference/projection.h"
 

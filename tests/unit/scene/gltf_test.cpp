@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // glTF with KHR_gaussian_splatting: what is written can be read back, files in the style of other
 // writers are read as they state, and hostile ones are refused.
 #include <fmt/format.h>

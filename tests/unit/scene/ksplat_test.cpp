@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // .ksplat: files built by hand at each compression level.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/merge_splats.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scenes with a user's own kernel: the file keeps the kernel, and hostile headers are errors.
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Splat PLYs as other programs write them: what is read, and which notes are given.
 #include "engine/scene/ply.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Steps of a pose in pixels, and steps that move the scene as a whole.
 #include "engine/scene/pose_metric.h"
 

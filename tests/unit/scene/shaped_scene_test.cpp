@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scenes with the kernel beta: which files keep each splat's shape and which refuse it, scenes of
 // Deformable Beta Splatting, and the nearest Gaussians.
 #include <gtest/gtest.h>

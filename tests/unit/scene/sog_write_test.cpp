@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Writing SOG: what is read back, from a zip and from a folder.
 #include <fmt/format.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The table of splat attributes: its rows fit together, files carry every row, and code that only
 // passes attributes on names none of them, so that adding one takes a row, its shader code and its
 // reference.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/splat_file.h"
 
 #include <fmt/format.h>

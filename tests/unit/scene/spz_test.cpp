@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "engine/scene/spz.h"
 
 #include "engine/scene/edit_splats.h"

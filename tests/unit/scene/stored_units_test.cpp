@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Files whose values are stored in other units than those of a 3DGS scene: they are doubted, judged
 // by all their values, and read correctly where the user says how they are stored. Ordinary scenes
 // are not doubted.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Streamed SOG: levels in files, and a tree that says where their splats are.
 #include <fmt/format.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The subject of a scene, with synthetic rigs of cameras.
 #include "engine/scene/subject.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The comparison helpers against planted errors: each kind of mistake must be found.
 #include "tests/support/compare_arrays.h"
 

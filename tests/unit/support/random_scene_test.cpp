@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The scene helper: what it promises to the tests that use it.
 #include "tests/support/test_scene.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The parts of a run in blocks that need no device: cells, cameras, surroundings, cut and join,
 // the manifest.
 #include <gtest/gtest.h>

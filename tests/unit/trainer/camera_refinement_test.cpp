@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Refined cameras without a picture: the effect of the anchor of tracks alone.
 #include "trainer/step/camera_refinement.h"
 

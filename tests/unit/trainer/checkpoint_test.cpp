@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Checkpoint files: what is written can be read back, and a file that is damaged, cut off or from
 // another run gives an Error that names the file and the reason.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // trainer/optimizer: rates in the units of the scene, regularisers, and what a trial changes.
 #include "trainer/step/optimizer.h"
 

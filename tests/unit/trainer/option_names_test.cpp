@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One table makes every option: each row is set from the command line, by its name and from a saved
 // request, and comes to the same value. Python's keywords: tests/python/trainer_test.py.
 #include <gtest/gtest.h>

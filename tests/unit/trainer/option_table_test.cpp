@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The table of training options: every row takes its values and no others, and is in the settings
 // that a resumed run must repeat. That each does something: option_effect_test.
 #include "trainer/options/option_table.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // trainer/probe: what a probe of the degree does with the run that it forks, on a stand-in for a
 // run.
 #include "trainer/step/probe.h"

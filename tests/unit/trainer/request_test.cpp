@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A training request is saved and read back as it was, also where its folder has moved, and a file
 // that is not one names the entry that is wrong.
 #include "trainer/job/request.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a run does at which iteration, from its options alone.
 #include "trainer/options/schedule.h"
 

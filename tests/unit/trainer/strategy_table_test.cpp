@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The table of strategies: names, numbers, and what each of them knows.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The time left of a run, estimated for runs whose pace was recorded (tools/lab/record_pace.py).
 #include "trainer/run/time_left.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // trainer/view_order: every epoch shows each view once, in an order that repeats.
 #include "trainer/step/trainer.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Selection, deletion, undo; cameras for a window; picking.
 #include "viewer/edit.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where a scene without cameras is looked at from, and which way is up.
 #include <gtest/gtest.h>
 

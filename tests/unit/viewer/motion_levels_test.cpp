@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "viewer/picture_pacing.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The control of frames in motion on modelled devices, and the order of importance.
 #include "viewer/picture_pacing.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where the camera goes when mouse and keys move it.
 #include "viewer/navigation.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What an export of a camera path does to the folder that it writes to: with every length of a
 // path, and with every list of an earlier export, the files of others stay.
 #include "viewer/path_export.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which picture a frame draws: in motion, at rest, before a long one, and while other work draws.
 #include "viewer/picture_pacing.h"
 

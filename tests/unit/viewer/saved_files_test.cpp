@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Files that the viewer writes over, and those that it asks about first; what it lists to open.
 #include "viewer/saved_files.h"
 

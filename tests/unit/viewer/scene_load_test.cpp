@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is no file is refused by its kind, at once, and never makes the loader wait.
 #include <gtest/gtest.h>
 #include <sys/socket.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which splats a stroke or a range of values has; the gizmo's handles.
 #include "viewer/edit.h"
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Small valid pictures from nothing: PNG, JPEG (baseline and progressive) and lossless WebP, standard library alone."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Part 2: writes that fail, are short or interrupted at every call in turn, full and closed standard streams, a limit on
 the size of files. The error is said, earlier outputs stay whole, and the next run leaves nothing behind."""
 

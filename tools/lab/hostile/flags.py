@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Part 4: random combinations of the options of every command, as --help lists them, with values at and beyond their
 limits. Values that only make a run long are left out."""
 

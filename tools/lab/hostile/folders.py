@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Part 5: outputs onto inputs and into links, folders that cannot be written, two runs in one folder, FIFOs, devices and
 folders where a file is meant."""
 

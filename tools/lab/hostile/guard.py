@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One case: a fresh folder, the commands that run in it under bounds, and what was wrong with them."""
 
 import hashlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Part 3: SIGKILL, SIGTERM, SIGINT and SIGHUP at random moments of short trainings; each is resumed, and ends in the
 scene of a run that nobody ended, to the byte. No signal but SIGKILL loses what was trained so far."""
 

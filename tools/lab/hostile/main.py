@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs hostile cases for a while and writes what they found: hostile.json and hostile.txt, with the command that repeats
 each finding and its files.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Damage to files: bytes, text and JSON. Every function takes a random.Random and returns (damaged, what was done)."""
 
 import json

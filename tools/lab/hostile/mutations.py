@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Part 1: every kind of input file, damaged, into the commands that read it."""
 
 import filecmp

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Part 6: reports of data sets with hostile names hold no markup of theirs, and cfg_args no code."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The valid inputs that the parts start from: data sets of four small photos, written here, and what darb makes of them."""
 
 import gzip

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/lab/make_scene/capture.h"
 
 #include <fmt/format.h>

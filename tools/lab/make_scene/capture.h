@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cameras around the still life, the pictures that they take, and the points that they see.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // make_scene FOLDER [SCALE]: renders the data set that the project ships: a still life seen from 40
 // training and 8 held-out cameras, with a COLMAP model, and 16 views off that path. Every run
 // writes the same bytes. SCALE 1 to 8 multiplies the photos' sides of 200 x 150 px.

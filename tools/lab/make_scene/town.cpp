@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/lab/make_scene/town.h"
 
 #include <fmt/format.h>

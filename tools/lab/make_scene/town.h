@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A generated town for training in blocks: a square of streets, houses and trees, far larger than
 // what one camera sees, and a flight over it.
 #pragma once

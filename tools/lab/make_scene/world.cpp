@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/lab/make_scene/world.h"
 
 #include <algorithm>

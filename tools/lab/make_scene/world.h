@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Shapes of the generated scene, each in its own frame: centred on 0, with its axis along z.
 #pragma once
 

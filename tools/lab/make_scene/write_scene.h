@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Writes the captured scene as a data set that darb and other common trainers can read.
 #pragma once
 

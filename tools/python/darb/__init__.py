@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """darb: 3D splats with a choice of kernel, on any Vulkan device.
 
 Arrays in, arrays out: numpy arrays of float32, or whatever has DLPack or the buffer protocol and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """darb.rasterize with gradients for PyTorch: float32 tensors on the CPU, without copies of them.
 
     import torch, darb.torch

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Compares kernels' gradients: what each says of where a splat is and how large it is.
 
     compare_gradients.py [-o FOLDER] [--size N]

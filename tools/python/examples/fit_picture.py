@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Fits splats to one picture with a kernel of one's own.
 
     fit_picture.py [PICTURE.png] [-o FOLDER] [--splats N] [--steps N] [--kernel NAME]

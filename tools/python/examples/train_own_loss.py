@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Trains a data set step by step with a loss of one's own.
 
     train_own_loss.py [DATASET] [-o FOLDER] [--iterations N] [--resolution N]
