@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // BarrierTracker: which buffers were written and read by what, and the memory barrier that the next
 // pass needs. One barrier orders everything before it, not a buffer alone: so drivers carry out
-// barriers of buffers, too, and passes that share nothing may then run side by side. Whole buffers
-// only. Private to engine/gpu.
+// barriers of buffers, too, and passes that share nothing may then run side by side. It knows whole
+// buffers only. Private to engine/gpu.
 #pragma once
 
 #include <vulkan/vulkan.h>

@@ -76,7 +76,7 @@ class Buffer {
     VkBuffer buffer_ = VK_NULL_HANDLE;
     std::unique_ptr<MemoryPiece> memory_;
     void* mapped_ = nullptr;  // set for all kinds but Memory::device
-    void* direct_ = nullptr;  // either kind where the host may copy without staging
+    void* direct_ = nullptr;  // set where the host may copy without staging, whatever the kind
     std::uint64_t bytes_ = 0;
     std::uint64_t allocated_ = 0;  // bytes charged to the device
 

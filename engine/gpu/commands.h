@@ -108,7 +108,7 @@ class Commands {
         wait();
     }
 
-    /// Since begin(), in order.
+    /// The passes recorded since begin(), in order.
     const std::vector<RecordedPass>& recorded() const;
 
     /// After wait(): one row per pass() in order of recording, empty if timestamps are off.

@@ -20,20 +20,21 @@ struct DeviceInfo;
 
 enum class BackwardBlend {
     subgroup,  // a subgroup walks a tile's list, reductions over its pixels: blend_backward.comp
-    team,      // the same by a subgroup an area of the tile: blend_backward_team.comp
+    team,      // the same with a subgroup for each area of the tile: blend_backward_team.comp
     buckets,   // a thread owns an intersection, from checkpoints: blend_backward_buckets.comp
     pixels,    // as a team, sums by pixels of 8 splats at a time: blend_backward_pixels.comp
     pixels4,   // the same with 4 at a time, which takes less shared memory
 };
 
-/// In the order of the enum.
+/// Names in the order of the enum.
 inline constexpr const char* kBackwardBlends[] = {"subgroup", "team", "buckets", "pixels",
                                                   "pixels4"};
 
 constexpr bool is_by_pixels(BackwardBlend form) {
     return form == BackwardBlend::pixels || form == BackwardBlend::pixels4;
 }
-/// Whether it leaves the sums of every intersection, zeros included; others add to what is there.
+/// Whether this form writes the sums of every intersection, zeros included; others add to what is
+/// there.
 constexpr bool writes_every_slot(BackwardBlend form) {
     return form == BackwardBlend::team || is_by_pixels(form);
 }
@@ -58,8 +59,8 @@ struct Tuning {
     bool scan_by_thread = false;  // Scan::Strategy::team_is_thread
     SortScatter scatter = SortScatter::ballot;
     std::uint32_t blend_threads = 0;  // size of the forward blend's workgroup, which has a tile
-    // The forward blend by records of splats in shared memory, a subgroup a block of the tile:
-    // blend_records.comp, where it serves (Forward::blends_records).
+    // Whether the forward blend goes by records of splats in shared memory, a subgroup for each
+    // block of the tile: blend_records.comp, where that can be used (Forward::blends_records).
     bool blend_records = false;
     std::uint32_t blend_lanes = 0;  // lanes of a subgroup in both blends; 0: the device's own
     BackwardBlend backward = BackwardBlend::subgroup;
@@ -73,7 +74,8 @@ struct Tuning {
 /// else 32. 0 where the device has no such subgroups, or less than 32 KiB of shared memory.
 std::uint32_t lanes_by_pixels(const DeviceInfo& info, std::uint32_t chosen);
 
-/// What a device begins with: on lavapipe what was measured by hand at each of its vector widths.
+/// The tuning that a device begins with: on lavapipe the one measured by hand for each of its
+/// vector widths.
 Tuning usual_tuning(const DeviceInfo& info);
 
 /// What `darb devices` prints, and what the choice is made from.
@@ -88,7 +90,7 @@ struct DeviceInfo {
     std::uint32_t api_version = 0;
     std::uint64_t heap_bytes = 0;                // largest device-local heap
     std::uint64_t max_storage_buffer_bytes = 0;  // maxStorageBufferRange
-    std::uint64_t max_allocation_bytes = 0;      // the most of one buffer
+    std::uint64_t max_allocation_bytes = 0;      // the most that one buffer may have
     std::uint32_t max_storage_buffers = 0;       // per stage
     std::uint32_t max_workgroup_threads = 0;
     std::uint32_t shared_memory_bytes = 0;
@@ -115,7 +117,7 @@ std::vector<DeviceInfo> list_devices();
 /// part of a name (the best usable match). Throws Error: none, none usable, no match, not usable.
 std::size_t choose_device(const std::vector<DeviceInfo>& devices, const std::string& select);
 
-/// A device and its driver in a line for people; others: names of the usable ones besides.
+/// A device and its driver on one line of text; others: names of the other usable ones.
 std::string describe_choice(const DeviceInfo& chosen, const std::vector<std::string>& others);
 
 struct DeviceOptions {
@@ -125,8 +127,8 @@ struct DeviceOptions {
     /// Nothing is given to the queue: what is downloaded is 0. Pipelines are compiled anew, past
     /// every cache, and Device::compiled says what the driver tells of them.
     bool compile_only = false;
-    /// A pipeline lives as long as the device, also while nothing uses it: for whoever makes and
-    /// drops again and again what draws.
+    /// A pipeline lives as long as the device, even while nothing uses it: for programs that keep
+    /// making and dropping renderers.
     bool keep_pipelines = false;
     /// Compiled pipelines and the record of the tuner are kept there; "" = nowhere.
     std::filesystem::path cache_folder;

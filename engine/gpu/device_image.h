@@ -17,15 +17,15 @@ struct MemoryPiece;  // private to engine/gpu
 class DeviceImage {
   public:
     DeviceImage();
-    /// Texels of 4 bytes. usage: besides copies from and to it. Its memory does not count as
-    /// Device::allocated_bytes: images are a window's, and the budget is a run's. Throws NoRoom
-    /// naming the image and its size.
+    /// The texels have 4 bytes. usage: what it is for besides copies from and to it. Its memory
+    /// does not count as Device::allocated_bytes: images are a window's, and the budget is a run's.
+    /// Throws NoRoom naming the image and its size.
     DeviceImage(Device& device, const std::string& name, int width, int height, VkFormat format,
                 VkImageUsageFlags usage = 0);
     ~DeviceImage();
     DeviceImage(DeviceImage&&) noexcept;
     DeviceImage& operator=(DeviceImage&&) noexcept;
-    /// One that somebody else owns, as a swapchain does; what it holds is not needed.
+    /// An image that somebody else owns, such as a swapchain; what it holds is not needed.
     static DeviceImage of_another(VkImage image, int width, int height, VkFormat format);
 
     VkImage handle() const { return image_; }

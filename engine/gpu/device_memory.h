@@ -27,7 +27,7 @@ struct MemoryPiece {
     VkDeviceSize offset = 0, bytes = 0;
     VkMemoryPropertyFlags flags = 0;
     void* mapped = nullptr;        // its first byte, where the host may map it
-    MemoryBlock* block = nullptr;  // null: of its own
+    MemoryBlock* block = nullptr;  // null: an allocation of its own
 };
 
 struct MemoryBlock {

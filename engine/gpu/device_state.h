@@ -55,7 +55,7 @@ struct ListedDevice {
     DeviceInfo info;
 };
 
-/// Best first, indices set.
+/// All devices, best first, indices set.
 std::vector<ListedDevice> list_devices(const Instance& instance);
 
 std::string hex(std::span<const std::uint8_t> bytes);
@@ -96,7 +96,7 @@ struct Device::State {
     VkDevice device = VK_NULL_HANDLE;
     VkQueue queue = VK_NULL_HANDLE;
     std::mutex queue_mutex;  // queues are externally synchronised
-    bool submitted = false;  // since the last wait for all, under queue_mutex
+    bool submitted = false;  // whether work was, since the last wait for all; under queue_mutex
     std::filesystem::path cache_folder, cache_file;
     std::size_t loaded_cache_bytes = 0;
     VkPipelineCache cache = VK_NULL_HANDLE;
@@ -125,7 +125,7 @@ struct Device::State {
     /// be null.
     VkResult submit(VkCommandBuffer commands, VkFence fence, VkSemaphore wait_for = VK_NULL_HANDLE,
                     VkSemaphore signal = VK_NULL_HANDLE);
-    /// The same of a staging copy, which the fault injection does not count.
+    /// The same for a staging copy, which the fault injection does not count.
     VkResult submit_copy(VkCommandBuffer commands);
     VkResult wait_idle();
     /// The same where work was submitted since the last wait: the call alone takes 40 us on

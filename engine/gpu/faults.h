@@ -30,9 +30,9 @@ struct Faults {
     std::optional<std::uint32_t> timestamp_bits;
     bool discrete = false;
 
-    /// in_all: bytes of all buffers, this one included.
+    /// in_all: bytes of all buffers, including this one.
     bool fails_allocation(std::string_view buffer, std::uint64_t in_all) const;
-    /// count: of all allocations, the new one included.
+    /// count: of all allocations, including the new one.
     bool fails_allocations(std::uint64_t count) const {
         return allocations != 0 && count > allocations;
     }

@@ -50,8 +50,8 @@ class SpecConstants : public std::map<ConstantName, SpecValue> {
 /// The same values for passes of which each takes those that its shader declares.
 SpecConstants for_several_passes(SpecConstants constants);
 
-/// In place of a size: the driver chooses one for each shader, as many lanes as it has registers
-/// for. For a shader that computes the same with any.
+/// In place of a size: the driver chooses one for each shader, with as many lanes as it has
+/// registers for. For shaders that compute the same with any size.
 inline constexpr std::uint32_t kAnySubgroupSize = ~0u;
 
 /// All that a pipeline is made of: equal keys are one pipeline of a device. Constants of a table

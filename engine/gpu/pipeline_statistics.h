@@ -37,7 +37,8 @@ struct CommonStatistics {
     std::optional<double> instructions;
     std::optional<double> cycles;  // static: loops once, or as the driver guesses
 };
-/// By the names of RADV, NVK, ANV, Turnip and Honeykrisp; what a driver lacks stays empty.
+/// Finds them by the names of RADV, NVK, ANV, Turnip and Honeykrisp; what a driver lacks stays
+/// empty.
 CommonStatistics common_statistics(const CompiledPipeline& pipeline);
 
 }  // namespace darb

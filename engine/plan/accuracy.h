@@ -51,7 +51,7 @@ int preset_of_option(std::string_view name);
 std::string accuracy_flag(const AccuracySetting& setting);  // "--alpha-cutoff"
 std::string accuracy_help(const AccuracySetting& setting);  // with the names of its choices
 
-/// One choice a setting; all defaults at first.
+/// One choice per setting; all defaults at first.
 struct Accuracy {
     std::array<int, kAccuracyCount> choice{};
 
@@ -78,12 +78,12 @@ struct FrameAccuracy {
 };
 FrameAccuracy frame_accuracy(const Accuracy& accuracy, const SplatModel& model);
 
-/// Into the options of a forward pass: all but footprint, SH degree and resolution.
+/// Puts them into the options of a forward pass: all but footprint, SH degree and resolution.
 void set_options(const Accuracy& accuracy, ForwardOptions& options);
 /// Whether the choice `builtin` of evaluation changes anything: not of blends, of the parabolic
 /// kernel and of those of one's own but in the forms that need no polynomial.
 bool has_builtin_evaluation(int kernel);
-/// Whether the evaluation is another on this device than the default's.
+/// Whether the evaluation on this device differs from the default's.
 bool changes_evaluation(const Device& device, const Accuracy& accuracy, int kernel);
 
 }  // namespace darb

@@ -27,11 +27,12 @@ struct AntialiasProbe {
     ProbedRun without, with;
     std::vector<ProbedSize> sizes;  // by scale, ascending; not empty
     double gain_db() const;         // mean over the sizes
-    /// Where it gains in that mean and loses no more than a dB at the trained size.
+    /// Whether it gains in that mean and loses no more than 1 dB at the trained size.
     bool pays() const;
 };
 
-/// The row of anti-aliasing as the probe decides it; where the command line has, the reason alone.
+/// Sets the row of anti-aliasing as the probe decides; where the command line has decided, only its
+/// reason.
 void take_probe(const AntialiasProbe& probe, EffectPlan& plan);
 
 // Trial: what one way of training gained over another in two short runs, on photos that neither
@@ -44,7 +45,7 @@ struct Trial {
     double usual_db = 0, tried_db = 0;  // mean PSNR of the held-out photos
     double price = 0;                   // extra time, as a share: 0.1 is 10 %
     double gain_db() const { return tried_db - usual_db; }
-    /// Where it gains more than two runs of one way differ by chance.
+    /// Whether it gains more than two runs of one way differ by chance.
     bool pays() const { return gain_db() > kLeastGain_db; }
     /// The advice in words.
     std::string advice() const;

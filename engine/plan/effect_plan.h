@@ -68,7 +68,8 @@ EffectChoice parse_effects(std::string_view text);
 /// The words of --effects; without lenses the photos of data are straightened at load. Throws Error
 /// where they cannot be read, ask for an effect that the use cannot have, or contradict --lens.
 EffectChoice choose_effects(const std::string& text, EffectUse use, DatasetOptions& data);
-/// What the words say of this effect by its name: + is true, - is false; nothing where they do not.
+/// What the words say of this effect by its name: + is true, - is false; nothing where they do not
+/// name it.
 std::optional<bool> effect_in_words(std::string_view text, std::string_view effect);
 /// Whether the words leave this effect out, by its name or by `none`.
 bool words_refuse_effect(std::string_view text, std::string_view effect);

@@ -70,9 +70,9 @@ class TuningFrame {
     bool has_timestamps_;
 };
 
-/// All but buckets, which hold 17 to 34 million intersections a frame in the 4 GiB that Vulkan
-/// binds at most, the other way 134 million: how many a run will need is not known here, so they
-/// are for who asks for them.
+/// True for all but buckets: in the 4 GiB that Vulkan binds at most, they hold 17 to 34 million
+/// intersections a frame, the other way 134 million. How many a run will need is not known here, so
+/// only who asks for buckets gets them.
 bool may_be_chosen(std::string_view choice);
 
 /// How far w by the driver's own exp strays from the truth, for the kernels of is_exponential: the
@@ -81,10 +81,10 @@ double exp_error(Device& device);
 
 constexpr double kExpTolerance = 3e-6;
 
-/// Each group with all others at their usual choice, and the best of each as choose_form finds it
-/// (form_times.h). One that a driver refuses is left out, and so is the driver's exp where
-/// exp_error is above the tolerance. The device's tuning and its peak of memory are afterwards as
-/// before. group: that one alone; empty: all.
+/// Measures each group with all others at their usual choice; the best of each is as choose_form
+/// finds it. One that a driver refuses is left out, and so is the driver's exp where exp_error is
+/// above the tolerance. The device's tuning and its peak of memory are afterwards as before. group:
+/// the only one to measure; empty: all.
 TuningRecord measure_tuning(Device& device, std::string_view group = {},
                             double exp_tolerance = kExpTolerance);
 
@@ -98,7 +98,8 @@ TuningRecord look_again(Device& device, TuningRecord record, TimedFrame frame);
 /// it cannot be read, or it is of another device, driver, subgroup size or set of shaders.
 std::optional<TuningRecord> read_tuning(const DeviceInfo& info,
                                         const std::filesystem::path& folder);
-/// Atomically. A folder that cannot be written is no error: the next process measures again.
+/// Writes the record atomically. A folder that cannot be written is no error: the next process
+/// measures again.
 void write_tuning(const DeviceInfo& info, const std::filesystem::path& folder,
                   const TuningRecord& record);
 
@@ -117,7 +118,7 @@ void tune(Device& device, const TuneRequest& request);
 /// is made for the device.
 void settle_tuning(Device& device, const std::string& forced = {}, bool retune = false);
 
-/// The choice in a line, with the milliseconds of all.
+/// The choice on one line, with the milliseconds of all.
 std::string tuning_text(const TuningRecord& record);
 
 // How forms of a pass are timed and compared, without a device: the tuner gives it one, tests give
@@ -148,7 +149,7 @@ struct FormTimes {
 
 /// The usual form, or the one that takes least of those that are worth a change: the median of its
 /// ratios to the usual one, round by round, is at most 0.97, and lies below 1 by more than twice
-/// the standard error that their spread gives it. may_win: of each form; empty: all.
+/// the standard error that their spread gives it. may_win: for each form; empty: all may.
 std::size_t best_form(const FormTimes& times, const std::vector<bool>& may_win = {});
 
 /// Runs the usual form until two windows of a fifth of a second agree to 2 %, within the effort's

@@ -19,7 +19,8 @@ using TuningNames = std::map<std::string, std::string, std::less<>>;
 struct TuningGroup {
     std::string name;
     std::vector<std::string> choices;  // the usual one first
-    // Whose time it decides, as Commands::pass names them; none: it is never measured.
+    // The passes whose time it decides, by their names in Commands::pass; none: it is never
+    // measured.
     std::vector<std::string> passes;
     bool changes_bits = false;  // results differ by rounding, or by the order of sums of floats
 };
@@ -38,12 +39,12 @@ TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const st
 /// What a checkpoint names, less the lanes where this device has no such subgroups.
 TuningNames checkpoint_tuning(const DeviceInfo& info, std::string_view text,
                               const std::string& where);
-/// In the same form, in the order of the groups.
+/// The names as text in the same form, in the order of the groups.
 std::string names_text(const TuningNames& names);
 
 /// The choice for every group.
 TuningNames tuning_names(const Tuning& tuning);
-/// names as parse_tuning gives them.
+/// names: as parse_tuning gives them.
 Tuning with_names(Tuning tuning, const TuningNames& names);
 /// The tuning for whoever goes on with a run that began with this text: it leads to the same bits.
 /// If the text does not name them, the lanes were the device's own, exp was a polynomial, and blend

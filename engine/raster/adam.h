@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What one step of the optimiser takes: Adam's rates of each attribute and what is beside Adam.
+// What one step of the optimiser needs: Adam's rates for each attribute, and what goes with Adam.
 #pragma once
 
 #include <array>
@@ -57,9 +57,9 @@ class AdamUpdate {
     explicit AdamUpdate(Device& device);
 
     /// splats must have moments, and the gradients must be theirs. status: gpu::FrameStatus of the
-    /// frames; where one overflowed nothing happens. scale: of the gradients, 1 / views for the
-    /// mean of the views' losses. step.clearance is record_fading's. Throws Error for what
-    /// check_step refuses and for gradients of other splats.
+    /// frames; where one overflowed nothing happens. scale: factor of the gradients, 1 / views for
+    /// the mean of the views' losses. Only record_fading() uses step.clearance. Throws Error for
+    /// what check_step refuses and for gradients of other splats.
     void record(Commands& commands, GpuSplats& splats, const GradientBuffers& gradients,
                 const Buffer& status, int sh_degree, const AdamStep& step, float scale = 1);
 
@@ -68,7 +68,7 @@ class AdamUpdate {
     void record_fading(Commands& commands, GpuSplats& splats, const GradientBuffers& gradients,
                        const Buffer& status, const FrameView& view, float clearance);
 
-    /// What the views showed, added to sums [N][2] as Backward::gradient_sum() holds them.
+    /// Adds what the views showed to sums [N][2] such as Backward::gradient_sum().
     void record_sums(Commands& commands, const GradientBuffers& gradients, const Buffer& status,
                      const Buffer& gradient_sum);
 

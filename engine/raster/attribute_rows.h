@@ -49,7 +49,7 @@ struct AttributeRows {
 /// second).
 AttributeRows attribute_rows(int attribute, std::uint32_t floats, std::uint32_t of_each = 1);
 
-/// The rows of a range of splats, which begins as splat_ranges() has it.
+/// The rows of a range of splats, such as splat_ranges() gives.
 BufferRange range_of_rows(const Buffer& buffer, const AttributeRows& rows, const SplatRange& range);
 /// The same where splats lie in blocks; else the whole buffer, as what a frame holds of a splat is
 /// wider.
@@ -57,12 +57,12 @@ BufferRange bound_rows(const Buffer& buffer, const AttributeRows& rows, const Sp
 
 /// Writes the rows [first, first + count) of [N][floats], whose rows are `pitch` floats apart, to
 /// where they lie in a buffer of N splats that begins at `to`; first: a multiple of ROW_BLOCK, as
-/// count is but where N ends there. What is padding becomes 0. Whether all of the values are
-/// finite. A thread calls stream_fence() after the last of its calls.
+/// count is but where N ends there. Padding becomes 0. Returns whether all values are finite. A
+/// thread calls stream_fence() after the last of its calls.
 bool put_rows(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t first,
               std::size_t count, std::byte* to);
 
-/// What a buffer holds of [N][floats], and back.
+/// [N][floats] as a buffer holds them, and back.
 std::vector<float> held_rows(const AttributeRows& rows, std::span<const float> values);
 std::vector<float> values_of_rows(const AttributeRows& rows, std::span<const float> held,
                                   std::size_t splats);

@@ -29,8 +29,9 @@ class Backward {
   public:
     Backward(Device& device, const ForwardOptions& options);
 
-    /// Buffers for so many splats and intersections, records as BlendBackward::reserve says: never
-    /// shrinks, 0 of any asks for no more. Where there are more splats, gradient_sum() starts at 0.
+    /// Makes buffers for so many splats, intersections and records (see BlendBackward::reserve).
+    /// Never shrinks; 0 asks for no more of that kind. Where there are more splats, gradient_sum()
+    /// starts at 0.
     void reserve(std::uint32_t splats, std::uint32_t intersections, std::uint32_t records = 0);
     /// Device memory beside a frame of this size.
     static FrameBytes device_bytes(const FrameSize& size);

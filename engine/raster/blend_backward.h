@@ -30,13 +30,13 @@ class BlendBackward {
     /// What the buffers below can hold, by the device's bindings and its largest buffer.
     static std::uint64_t max_intersections(const Device& device);
 
-    /// What shaders/backward/blend_backward.comp says, in the order of emission: float
-    /// [K][8]. Shaders bind PARTIAL_WINDOWS windows of it, as lib/partials.glsl says.
+    /// float [K][8], in the order of emission: the sums of shaders/backward/blend_backward.comp.
+    /// Shaders bind PARTIAL_WINDOWS windows of it, as lib/partials.glsl says.
     const Buffer& partials() const { return partials_; }
     BufferRange partials(std::uint32_t window) const;
     std::uint32_t window_intersections() const { return window_intersections_; }
     const Buffer& rest() const { return rest_; }  // float [K], [K][2] with options.depth_sum
-    /// float [K] of a kernel with shapes: sums of its derivative by the exponent; else a word.
+    /// float [K] for a kernel with shapes: sums of its derivative by the exponent; else one word.
     const Buffer& exponent() const { return exponent_; }
 
   private:

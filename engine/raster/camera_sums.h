@@ -17,15 +17,16 @@ class CameraSums {
   public:
     explicit CameraSums(Device& device);
 
-    /// Buffers for so many splats: never shrinks. Throws Error where the device binds no more.
+    /// Makes buffers for so many splats; never shrinks. Throws Error where the device binds no
+    /// more.
     void reserve(std::uint32_t splats);
     static std::uint64_t device_bytes(std::uint64_t splats);
 
     /// The buffer to pass as GradientTarget::camera.
     Buffer& shares() { return shares_; }
-    /// After Backward::record_gradients. d_position: float [N][3].
+    /// To be called after Backward::record_gradients. d_position: float [N][3].
     void record(Commands& commands, std::uint32_t splats, const Buffer& d_position);
-    /// What record() came to, once the queue is idle: shaders/shared/optim_args.h has the order.
+    /// The sums of record(), once the queue is idle: shaders/shared/optim_args.h has the order.
     std::array<double, CAMERA_SUMS> read() const;
 
   private:

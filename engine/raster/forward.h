@@ -36,7 +36,7 @@ class Forward {
     /// the splats and the size.
     void record(Commands& commands, const GpuSplats& splats, const FrameView& view, Frame& frame);
 
-    /// The two steps of record(), for who changes the colours of the projected splats
+    /// The two steps of record(), for callers that change the colours of the projected splats
     /// (frame.splats.light) between them: the display modes of a viewer.
     void record_intersections(Commands& commands, const GpuSplats& splats, const FrameView& view,
                               Frame& frame);

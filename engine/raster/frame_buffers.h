@@ -22,19 +22,19 @@ class FrameBuffers {
     /// Makes the buffers fit: never shrinks. intersections: a guess, as a frame that needs more
     /// says so. The queue must be idle.
     void reserve(std::uint32_t splats, std::uint32_t intersections, int width, int height);
-    /// After a frame whose status is given: false where it is whole. Else makes room for what it
-    /// wanted, half as many intersections again where memory allows it, and clears the status; the
-    /// frame must then be recorded again. Throws Error where it can never fit. The queue must be
-    /// idle.
+    /// To be called with a frame's status after it. Returns false where the frame is whole; else
+    /// makes room for what it wanted, half as many intersections again where memory allows it, and
+    /// clears the status; the frame must then be recorded again. Throws Error where it can never
+    /// fit. The queue must be idle.
     /// make_other_buffers: called with the new capacity in size(), before the frame is done again,
     /// for what others hold of each intersection; where it throws, the capacity becomes what the
     /// frame wanted and no more, and it is called again.
     bool make_room(const gpu::FrameStatus& status,
                    const std::function<void()>& make_other_buffers = {});
-    /// The counters of a frame decide how the next one is emitted, where the options leave it to
+    /// Decides by a frame's counters how the next one is emitted, where the options leave it to
     /// them; make_room calls it. The queue may be busy.
     void note_status(const gpu::FrameStatus& status);
-    /// The overflow flag and all counters to zero. The queue must be idle.
+    /// Sets the overflow flag and all counters to zero. The queue must be idle.
     void clear_status();
 
     /// Device memory of a frame of this size.
@@ -44,7 +44,7 @@ class FrameBuffers {
     /// blend or with another.
     static std::uint32_t max_intersections(const Device& device);
     static std::uint32_t max_intersections(const Device& device, BackwardBlend backward);
-    /// Intersections of a checkpoint; 0: frames of these options have none.
+    /// Intersections per checkpoint; 0: frames with these options have none.
     static std::uint32_t bucket(const Device& device, const ForwardOptions& options);
 
   private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// FrameView: what a frame is drawn of, as the passes read it.
+// FrameView: what a frame is drawn from, as the passes read it.
 #pragma once
 
 #include <cstdint>
@@ -36,10 +36,10 @@ std::uint32_t image_tiles(int width, int height);
 
 // The size of a frame that a device can render: its picture, three floats a pixel, is one binding.
 
-/// planes: floats a pixel, of the picture or of its gradient.
+/// planes: floats per pixel of the picture or of its gradient.
 std::uint64_t max_frame_pixels(const Device& device, std::uint64_t planes = 3);
 
-/// Throws Error where a frame has more, with a width that fits. camera: whose frame it is,
+/// Throws Error where a frame has more, naming a width that fits. camera: the name of its camera,
 /// where that is known.
 void check_frame(const Device& device, int width, int height, const std::string& camera = {},
                  std::uint64_t planes = 3);

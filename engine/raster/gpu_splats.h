@@ -21,7 +21,8 @@ class GpuSplats {
     GpuSplats(Device& device, const SplatModel& model, bool with_moments,
               bool with_rest_sum = false);
 
-    /// Everything back to the host; kernel, footprint, origin and degree as given at the start.
+    /// Copies everything back to the host; kernel, footprint, origin and degree as given at the
+    /// start.
     SplatModel download() const;
 
     std::uint32_t count() const { return count_; }
@@ -33,9 +34,9 @@ class GpuSplats {
     bool has_moments() const { return static_cast<bool>(moments_[0]); }
 
     /// Floats per splat of an attribute (0 for kShRest at degree 0, and of an optional attribute
-    /// that the model has not).
+    /// that the model does not have).
     std::uint32_t stride(int attribute) const { return strides_[attribute]; }
-    /// Where a splat's lie in the attribute's buffer; of_each: 2 in that of the moments.
+    /// How a splat's floats lie in the attribute's buffer; of_each: 2 in the buffer of moments.
     AttributeRows rows(int attribute, std::uint32_t of_each = 1) const {
         return attribute_rows(attribute, strides_[attribute], of_each);
     }
@@ -54,14 +55,15 @@ class GpuSplats {
     Buffer& smoothing() { return smoothing_; }
     const Buffer& smoothing() const { return smoothing_; }
 
-    /// In SplatModel's layout: moments as [N][stride][2], first and second, the sum as
-    /// [N][stride of kShRest]. Blocking copies.
+    /// Blocking copies in SplatModel's layout: moments as [N][stride][2], first and second, the sum
+    /// as [N][stride of kShRest].
     std::vector<float> download_moments(int attribute) const;
     void upload_moments(int attribute, const std::vector<float>& values);
     std::vector<float> download_rest_sum() const;
     void upload_rest_sum(const std::vector<float>& values);
 
-    /// After an attribute's buffers were replaced by ones of another count (density control).
+    /// To be called after an attribute's buffers were replaced by ones for another count (density
+    /// control).
     void set_count(std::uint32_t count) { count_ = count; }
 
     /// The first `count` splats, a multiple of kFrozenUnit, are drawn and never change: no step of
@@ -76,13 +78,13 @@ class GpuSplats {
     }
     std::uint32_t trained_count() const { return count_ - frozen_; }
 
-    /// What passes over splats work off one dispatch at a time, as the harmonics and their moments
-    /// are bound by range where one binding of the device does not hold them all.
+    /// The ranges that passes over splats take, one per dispatch, as the harmonics and their
+    /// moments are bound by range where one binding of the device does not hold them all.
     std::vector<SplatRange> ranges() const;
-    /// The same of those that are not frozen.
+    /// The same for the splats that are not frozen.
     std::vector<SplatRange> trained_ranges() const;
-    /// Appends a buffer an attribute, in the order of ATTRIBUTE_*, as the passes over a range bind
-    /// them: the rows of the range of what is too wide to be bound whole.
+    /// Appends one buffer per attribute, in the order of ATTRIBUTE_*, as passes over a range bind
+    /// them: where one is too wide to be bound whole, only the rows of the range.
     void bind_parameters(const SplatRange& range, std::vector<BufferRange>& to) const;
     void bind_moments(const SplatRange& range, std::vector<BufferRange>& to) const;
     /// rest_sum() likewise.
@@ -91,7 +93,7 @@ class GpuSplats {
     /// Device memory of the parameters of so many splats of this kernel; their moments take twice
     /// as much.
     static std::uint64_t parameter_bytes(std::uint64_t count, int sh_degree, int kernel);
-    /// Floats per splat of the attributes, 0 of those that the kernel does not take.
+    /// Floats per splat of the attributes, 0 for those that the kernel does not take.
     static std::array<std::uint32_t, kAttributeCount> strides(int sh_degree, int kernel);
 
     /// The most splats that this device's bindings and its largest buffer allow.

@@ -19,7 +19,7 @@ class GradientBuffers {
     GradientBuffers() = default;
     /// For splats of this count and these attributes; all zero, as the sum over no view.
     GradientBuffers(Device& device, const GpuSplats& splats);
-    /// Whether these are for splats of such counts.
+    /// Whether these are for splats with the same counts.
     bool is_of(const GpuSplats& splats) const;
 
     std::uint32_t count() const { return count_; }
@@ -41,15 +41,15 @@ class GradientBuffers {
 
     /// Sets all to zero.
     void record_clear(Commands& commands) const;
-    /// These += other, of the same splats. Throws Error where they are not.
+    /// Adds `other` to these. Throws Error where it is not for the same splats.
     void record_add(Commands& commands, const GradientBuffers& other);
 
-    /// A caller's own: values in the layout of SplatModel. Throws Error where the count is another
-    /// or a value is not finite. The queue must be idle.
+    /// Copies of a caller's own values, in the layout of SplatModel. Throws Error where their count
+    /// differs or a value is not finite. The queue must be idle.
     void upload(int attribute, const std::vector<float>& values);
     std::vector<float> download(int attribute) const;
 
-    /// Device memory of so many splats.
+    /// Device memory for so many splats.
     static std::uint64_t device_bytes(std::uint64_t count, int sh_degree, int kernel);
 
   private:

@@ -30,8 +30,8 @@ struct BlockRegion {
     bool holds(const glm::dvec3& world) const;
 };
 
-/// A start from the coarse model: its splats in the region, to be trained, and the others that one
-/// of the cameras may see, frozen. Where the margin lies in cells that are done, `beside`, what
+/// A start from the coarse model: its splats in the region, to be trained, and the others that
+/// any of the cameras may see, frozen. Where the margin lies in cells that are done, `beside`, what
 /// they ended with, replaces the coarse splats. The few least opaque of the coarse ones around are
 /// left out that would not fill a unit. sh_degree: that of the result, where bands beyond the
 /// coarse model's are 0.
