@@ -45,7 +45,7 @@ Found find_option(std::string_view name) {
     return {};
 }
 
-RequestPlace place_of(const RequestOption& option, TrainRequest& request) {
+RequestPlace place_in(const RequestOption& option, TrainRequest& request) {
     return option.place == nullptr ? RequestPlace{} : option.place(request);
 }
 
@@ -53,11 +53,11 @@ bool has_member(const RequestOption& option) {
     return !std::holds_alternative<std::monostate>(option.row.member);
 }
 
-void put(const RequestOption& option, const std::string& text, TrainRequest& request) {
+void take_typed(const RequestOption& option, const std::string& text, TrainRequest& request) {
     const OptionRow& row = option.row;
     if (option.take) return option.take(request, text);
     if (has_member(option)) return set_option(row, text, request.train);
-    const RequestPlace place = place_of(option, request);
+    const RequestPlace place = place_in(option, request);
     if (auto* const* on = std::get_if<bool*>(&place)) **on = option_on(row, text);
     if (auto* const* whole = std::get_if<int*>(&place)) **whole = option_whole(row, text);
     if (auto* const* words = std::get_if<std::string*>(&place)) **words = text;
@@ -97,7 +97,7 @@ const RequestOption& request_option(std::string_view name) {
 OptionKind option_kind(const RequestOption& option) {
     if (has_member(option) || option.row.is_size) return option_kind(option.row);
     TrainRequest unused;
-    const RequestPlace place = place_of(option, unused);
+    const RequestPlace place = place_in(option, unused);
     if (std::holds_alternative<bool*>(place)) return OptionKind::on_off;
     if (std::holds_alternative<int*>(place) || std::holds_alternative<std::vector<int>*>(place))
         return OptionKind::whole;
@@ -111,7 +111,7 @@ void set_request_option(TrainRequest& request, std::string_view name, const std:
     if (text.empty())
         throw Error(own, "has an empty value", "Give a value, or leave the option out.");
     const bool opposite = find_option(name).opposite;
-    put(option, opposite ? (option_on(option.row, text) ? "off" : "on") : text, request);
+    take_typed(option, opposite ? (option_on(option.row, text) ? "off" : "on") : text, request);
     if (!was_given(request, own)) request.given.push_back(own);
 }
 
@@ -148,7 +148,7 @@ Json saved_value(const RequestOption& option, const TrainRequest& request) {
                 json = *at;
             }
         },
-        place_of(option, copy));
+        place_in(option, copy));
     return json;
 }
 
@@ -181,7 +181,7 @@ void restore_value(const RequestOption& option, const Json& value, TrainRequest&
             }
             if (!fits) throw of_another_type(option, value);
         },
-        place_of(option, request));
+        place_in(option, request));
 }
 
 }  // namespace darb

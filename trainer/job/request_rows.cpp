@@ -116,7 +116,7 @@ std::string strategy_help() {
 }
 
 // What changes many others at once.
-void add_wholes(Rows& rows) {
+void whole_rows(Rows& rows) {
     static const std::string presets = preset_help();
     rows.push_back(
         {.row = {.flags = "--schedule",
@@ -136,7 +136,7 @@ void add_wholes(Rows& rows) {
                     .take = take_preset});
 }
 
-void add_places(Rows& rows) {
+void place_rows(Rows& rows) {
     rows.push_back({.row = {.flags = "dataset,-s,--source-path",
                             .group = option_group::kInput,
                             .help = "COLMAP project, folder with transforms.json, a .json file, a "
@@ -186,7 +186,7 @@ void add_places(Rows& rows) {
          .restore = [](Request& r, Text text) { r.data.held_out = parse_hold_out(text); }});
 }
 
-void add_photos(Rows& rows) {
+void photo_rows(Rows& rows) {
     rows.push_back({.row = {.flags = "-i,--images",
                             .group = option_group::kPhotos,
                             .help = "photo folder of a COLMAP project",
@@ -236,7 +236,7 @@ void add_photos(Rows& rows) {
                     .place = [](Request& r) -> RequestPlace { return &r.data.depth_scale; }});
 }
 
-void add_run(Rows& rows) {
+void run_rows(Rows& rows) {
     rows.push_back(
         {.row = {.flags = "--resume",
                  .help = "go on from OUT/checkpoint.darb; `darb train --resume -o OUT` is enough",
@@ -262,7 +262,7 @@ void add_run(Rows& rows) {
          .place = [](Request& r) -> RequestPlace { return &r.device; }});
 }
 
-void add_scene(Rows& rows) {
+void scene_rows(Rows& rows) {
     static const std::string kernels =
         kernel_names() +
         " (each splat learns its shape), or one of your own: \"expr: (1 - q/9)^3, support 9\"";
@@ -307,7 +307,7 @@ void add_scene(Rows& rows) {
                     }});
 }
 
-void add_effects(Rows& rows) {
+void effect_rows(Rows& rows) {
     rows.push_back(
         {.row = {.flags = "--effects",
                  .group = option_group::kScene,
@@ -371,7 +371,7 @@ RequestOption accuracy_row(int setting) {
         .restore = choose};
 }
 
-void add_accuracy(Rows& rows) {
+void accuracy_rows(Rows& rows) {
     rows.push_back({.row = {.flags = "--pulses",
                             .group = option_group::kAccuracy,
                             .help = "of raised_cosine and sinc: 2 or 3 keep rings that the paper's "
@@ -398,12 +398,12 @@ void add_accuracy(Rows& rows) {
 }
 
 // The name of a row of TrainOptions in the file: its flag, its place in the settings, or its own.
-std::string key_of(const OptionRow& row) {
+std::string key_in_file(const OptionRow& row) {
     if (*row.flags != '\0') return option_name(row).substr(2);
     return *row.setting != '\0' ? row.setting : row.name;
 }
 
-void add_saving(Rows& rows) {
+void saving_rows(Rows& rows) {
     const auto list = [&rows](const char* flags, const char* help, const char* key,
                               RequestPlace (*place)(Request&)) {
         rows.push_back({.row = {.flags = flags,
@@ -456,12 +456,12 @@ void add_saving(Rows& rows) {
 Rows make_rows() {
     Rows rows;
     for (const auto add :
-         {add_wholes, add_places, add_photos, add_run, add_scene, add_effects, add_accuracy})
+         {whole_rows, place_rows, photo_rows, run_rows, scene_rows, effect_rows, accuracy_rows})
         add(rows);
     for (const OptionRow& row : option_rows())
         if (!std::holds_alternative<std::monostate>(row.member))
-            rows.push_back({.row = row, .section = "train", .key = key_of(row)});
-    add_saving(rows);
+            rows.push_back({.row = row, .section = "train", .key = key_in_file(row)});
+    saving_rows(rows);
     return rows;
 }
 
