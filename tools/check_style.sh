@@ -19,7 +19,7 @@ if [[ $tidy == 1 ]]; then
     command -v clang-tidy-14 >/dev/null || { echo "check_style.sh: --tidy runs clang-tidy-14; install that package" >&2; exit 2; }
     cmake -S . -B build-tidy -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
         -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DDARB_TESTS=OFF >/dev/null || exit 1
-    cmake --build build-tidy --target darb_shaders >/dev/null || exit 1 # headers that are made
+    ninja -C build-tidy generated/constants/darb_constant_names.h >/dev/null || exit 1 # a header that is made
     git ls-files 'engine/*.cpp' 'trainer/*.cpp' 'viewer/*.cpp' 'tools/*.cpp' |
         xargs -P "$(nproc)" -n 8 clang-tidy-14 -p build-tidy --quiet --warnings-as-errors='*' 2>/dev/null || exit 1
     echo "tidy: clean"
