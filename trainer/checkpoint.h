@@ -8,6 +8,7 @@
 #include <string>
 
 #include "engine/data/dataset.h"
+#include "trainer/gain_watch.h"
 #include "trainer/options.h"
 #include "trainer/trainer_state.h"
 
@@ -19,6 +20,7 @@ struct Checkpoint {
     std::string dataset;                       // dataset_fingerprint() of it
     double seconds = 0;                        // of training until then
     std::string tuning = "backward=subgroup";  // result_tuning(): the only ones of older files
+    GainState gain = {};                       // of a run with end_without_gain
 };
 
 /// What a file holds.

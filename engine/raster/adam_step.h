@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <limits>
 
 #include "engine/scene/splat_attributes.h"
@@ -16,6 +17,8 @@ struct AdamStep {
     // Weights of the mean opacity and the mean scale in the loss; of the splats that the frame
     // shows, or of all.
     float opacity_weight = 0, scale_weight = 0;
+    /// Splats that left the run and still count in these means, so that the others go on as before.
+    std::uint32_t splats_gone = 0;
     // Share of the step's views at which they act on what a view does not show, too.
     float regularise_unseen = 0;
     float largest_log_scale = std::numeric_limits<float>::max();  // none grows beyond it

@@ -100,6 +100,8 @@ void check_for_blocks(const TrainFlags& flags) {
     refuse(!r.save_iterations.empty(), "--save-iterations", kAfter);
     refuse(!r.checkpoint_iterations.empty(), "--checkpoint-iterations",
            "Leave it out; --checkpoint-interval is for each block.");
+    refuse(r.train.end_without_gain > 0, "--end-without-gain",
+           "Leave it out: blocks are joined when each has done its iterations.");
     refuse(flags.verbose, "--verbose", "Leave it out: each block's metrics.json has its passes.");
     refuse(r.allow_mixed, "--allow-mixed", "Leave it out: each block is trained on one rank.");
     refuse(r.train.start == StartPoints::dense || r.train.start == StartPoints::random,
