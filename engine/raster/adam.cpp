@@ -63,7 +63,7 @@ void check_trainable(const GpuSplats& splats, const AdamStep& step) {
 namespace {
 
 float weight_of(const AdamStep& step, int rule, std::uint32_t splats) {
-    const auto n = static_cast<float>(splats);
+    const auto n = static_cast<float>(splats + step.splats_gone);
     if (rule == STEP_OPACITY) return step.opacity_weight / n;
     return rule == STEP_SCALE ? step.scale_weight / (3.0f * n) : 0.0f;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <map>
 
@@ -17,6 +18,8 @@ namespace darb {
 
 struct AdamStep {
     /// Learning rates by the number of the attribute, as adam_step() leaves them: divided by 1 -
+    /// Splats that left the run and still count in these means, so that the others go on as before.
+    std::uint32_t splats_gone = 0;
     /// beta1^t.
     std::array<float, kAttributeCount> rate{};
     float inverse_sqrt_correction2 = 1;

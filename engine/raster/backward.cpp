@@ -88,7 +88,7 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
 
     if (splats.count() == 0) return;
     commands.pass("project backward");
-    const auto n = static_cast<float>(splats.count());
+    const auto n = static_cast<float>(splats.count() + step.splats_gone);
     gpu::ProjectBackwardArgs args{};
     args.camera_index = view.index;
     args.low_pass = static_cast<float>(LOW_PASS_DEFAULT);

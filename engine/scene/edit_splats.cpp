@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "engine/core/error.h"
+#include "engine/scene/undrawn.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {
@@ -182,6 +183,13 @@ std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatMode
             const glm::dvec3 p = position_of(model, i);
             return glm::all(glm::lessThanEqual(low, p)) && glm::all(glm::lessThanEqual(p, high));
         },
+        model);
+}
+
+std::size_t drop_undrawn(double cutoff, std::size_t first, SplatModel& model) {
+    const double least = undrawn_below(cutoff);
+    return keep_splats(
+        [&](std::size_t i) { return i < first || !(sigmoid(model.opacity_logit[i]) < least); },
         model);
 }
 

@@ -56,6 +56,10 @@ bool has_rotation(const SplatModel& model, std::size_t splat);
 std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatModel& model);
 /// Drops splats with an opacity below `least`, 0 to 1.
 std::size_t prune_opacity(double least, SplatModel& model);
+/// Drops splats that nothing draws: from the one with the number `first` on, those of an opacity
+/// below `cutoff`, the least alpha that is blended, by more than float32 may err. A picture keeps
+/// its bits, as the others keep their order. Returns the count of those that went.
+std::size_t drop_undrawn(double cutoff, std::size_t first, SplatModel& model);
 /// Drops the bands above `degree`.
 void limit_sh_degree(int degree, SplatModel& model);
 

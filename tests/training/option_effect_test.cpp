@@ -155,6 +155,8 @@ TEST(OptionEffect, another_value_of_each_option_trains_another_scene_long) {
     for (const OptionRow& row : option_rows()) {
         if (std::holds_alternative<std::monostate>(row.member)) continue;
         SCOPED_TRACE(key_of(row));
+        if (key_of(row) == "/end_without_gain")
+            continue;  // of the run, not of its trainer: see run_files_test
         TinyTraining t = run_for(row);
         const std::string key = key_of(row);
         const bool special = key == "/resolution_ramp" || key == "/random_points";

@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/point_cloud_ply.h"
+#include "engine/scene/splat_file.h"
 #include "tests/support/run_command.h"
 #include "trainer/step/checkpoint.h"
 
@@ -128,6 +129,69 @@ TEST_F(RunFiles, values_of_another_type_are_errors_of_input) {
     expect_input_error(resume(), {"metrics.json", "'iteration' is no whole number"});
 }
 
+// Steps of the opacity's logit by 2, downwards for all that no photo holds up.
+TEST_F(RunFiles, what_is_too_transparent_to_be_drawn_is_not_saved) {
+    const Outcome o =
+        darb(fmt::format("train '{}' -o '{}' -r 8 --iterations 4 --eval --opacity-lr 2 "
+                         "--opacity-reg 10 --save-iterations 2 "
+                         "--checkpoint-iterations 4",
+                         data().string(), run().string()));
+    ASSERT_EQ(o.code, 0) << o.err;
+    const json metrics = json::parse(read_text_file(run() / "metrics.json"));
+    const auto saved = metrics.at("saved_splats").get<std::size_t>(),
+               undrawn = metrics.at("undrawn_splats").get<std::size_t>(),
+               all = metrics.at("splats").get<std::size_t>();
+    EXPECT_GT(undrawn, 0u);
+    EXPECT_EQ(saved + undrawn, all);
+    EXPECT_EQ(load_splats(run() / "point_cloud" / "iteration_4" / "point_cloud.ply").size(), saved);
+    EXPECT_EQ(read_checkpoint(run() / "chkpnt4.darb").state.model.size(), all)
+        << "a run goes on with all of them";
+    EXPECT_NE(o.out.find(fmt::format("{} more were left out", undrawn)), std::string::npos)
+        << o.out;
+}
+
+// Splats without rates gain nothing; the look after iteration 3 says so, which ends the run.
+TEST_F(RunFiles, a_run_without_gain_ends_itself_and_a_resumed_one_at_the_same_iteration) {
+    const std::string options = fmt::format(
+        "train '{}' -o '{}' -r 8 --iterations 20 --eval --end-without-gain 2 --densify-until-iter "
+        "1 --average-from 0.5 "
+        "--position-lr-init 1e-20 --position-lr-final 1e-20 --scaling-lr 0 --rotation-lr 0 "
+        "--opacity-lr 0 "
+        "--feature-lr 0 --resolution-ramp off",
+        data().string(), run().string());
+    const Outcome o = darb(options + " --checkpoint-iterations 2 4");
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("the run ended itself: held-out photos have gained less than 0.02 dB "
+                         "since iteration 1"),
+              std::string::npos)
+        << o.out;
+    const json metrics = json::parse(read_text_file(run() / "metrics.json"));
+    EXPECT_EQ(metrics.at("iteration"), 6) << "3, and as long a mean as half of a run";
+    EXPECT_EQ(metrics.at("interrupted"), false);
+    EXPECT_NE(metrics.at("ended_early").get<std::string>().find("+0.000 dB"), std::string::npos);
+    const Bytes whole = read_file(run() / "point_cloud" / "iteration_6" / "point_cloud.ply");
+    EXPECT_EQ(resume().code, 0);
+    EXPECT_FALSE(fs::exists(run() / "earlier.1")) << "nothing is left to do";
+    for (const int from : {2, 4}) {  // before and after it was decided
+        fs::copy_file(run() / fmt::format("chkpnt{}.darb", from), run() / "checkpoint.darb",
+                      fs::copy_options::overwrite_existing);
+        fs::remove_all(run() / "point_cloud");
+        edit("metrics.json", [&](json& m) {
+            m["iteration"] = from;
+            m["interrupted"] = true;
+        });
+        const Outcome again = resume();
+        EXPECT_EQ(again.code, 0) << again.err;
+        EXPECT_EQ(json::parse(read_text_file(run() / "metrics.json")).at("iteration"), 6) << from;
+        EXPECT_EQ(read_file(run() / "point_cloud" / "iteration_6" / "point_cloud.ply"), whole)
+            << from;
+    }
+    expect_input_error(
+        darb(fmt::format("train '{}' -o '{}' -r 8 --iterations 4 --end-without-gain 2",
+                         data().string(), (folder_ / "other").string())),
+        {"--end-without-gain 2", "no photo is held out", "--eval"});
+}
+
 TEST_F(RunFiles, a_line_that_a_kill_cut_off_does_not_count) {
     leave_unfinished();
     std::ofstream(run() / "run.jsonl", std::ios::app) << "{\"event\": \"itera";
@@ -153,6 +217,7 @@ TEST_F(RunFiles, a_checkpoint_that_contradicts_its_settings_is_refused) {
     refused("none of them with finite numbers", [](Checkpoint& c) {
         for (float& value : c.state.model.position) value = std::nanf("");
     });
+    refused("does not look for a gain", [](Checkpoint& c) { c.gain.looks = {{1, 20.0}}; });
     refused("no JSON object", [](Checkpoint& c) { c.settings = "[]"; });
     refused("'strategy' is no text", [](Checkpoint& c) {
         json settings = json::parse(c.settings);

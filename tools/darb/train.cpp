@@ -100,6 +100,8 @@ void recall_request(const std::vector<std::string>& typed, TrainRequest& request
     constexpr std::array<std::string_view, 12> kBeside{
         "--resume", "-o",      "-m",     "--output", "--model-path", "--device",
         "-q",       "--quiet", "--view", "--tune",   "--retune",     "--verbose"};
+    refuse(r.train.end_without_gain > 0, "--end-without-gain",
+           "Leave it out: blocks are joined when each has done its iterations.");
     for (const std::string& word : typed) {
         const std::string_view name = std::string_view(word).substr(0, word.find('='));
         if (name.starts_with('-') &&

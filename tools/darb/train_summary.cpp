@@ -48,6 +48,8 @@ std::string summary_text(const TrainResult& summary, const RunShown& shown,
     std::string text;
     if (!quiet)
         text = fmt::format("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
+    if (!quiet && !summary.ended_early.empty())
+        text += fmt::format("the run ended itself: {}\n", summary.ended_early);
     if (!quiet && !summary.evaluations.empty()) {
         const Evaluation& e = summary.evaluations.back();
         text += fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
@@ -60,6 +62,11 @@ std::string summary_text(const TrainResult& summary, const RunShown& shown,
         text += (quiet ? "" : fmt::format("{:<9}", what)) + path.string() + "\n";
     };
     written("scene", summary.model);
+    if (const std::size_t gone = summary.undrawn + summary.dropped; !quiet && gone > 0)
+        text += fmt::format(
+            "          of {} splats; {} more were left out, as they are too transparent to be "
+            "drawn\n",
+            summary.saved, gone);
     if (!summary.pictures.empty()) written("picture", summary.pictures.front().file);
     written("report", summary.report);
     if (summary.interrupted)

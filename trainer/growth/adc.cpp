@@ -82,6 +82,7 @@ const StrategyRow& adc_row() {
         .defaults = {},
         .follows_3dgs = true,
         .grows_to_limit = false,
+        .drops_undrawn = true,
         .target = no_target,
         .forecast_end = end_by_photos,
         .forecast_mean = even_mean,

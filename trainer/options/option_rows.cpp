@@ -46,6 +46,15 @@ const OptionRow kRows[] = {
      .help = "length of the run",
      .least = 1,
      .most = 10'000'000},
+    {.flags = "--end-without-gain",
+     .setting = "/end_without_gain",
+     .member = &Opt::end_without_gain,
+     .group = option_group::kRun,
+     .help = "the run ends itself when held-out photos gained less than 0.02 dB in so many "
+             "iterations after growth; 0: "
+             "never, so that held-out photos stay a test of their own",
+     .most = 10'000'000,
+     .stands = [](const Opt& o, const Sched&) { return o.end_without_gain > 0; }},
     {.flags = "--batch",
      .setting = "/batch",
      .member = &Opt::batch,

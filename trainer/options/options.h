@@ -34,6 +34,10 @@ enum class StartPoints { automatic, points, dense, random };
 
 struct TrainOptions {
     int iterations = 30'000;
+    // The run ends itself where held-out photos gained nothing for so many iterations; 0: never.
+    // Off by default, as a run whose length held-out photos decide is no longer measured by photos
+    // that it knows nothing of.
+    int end_without_gain = 0;
     std::uint64_t seed = 0;
     // Views a step, a power of two: their gradients are added by a binary tree over the views'
     // places in the batch, then the optimizer makes one step of their mean. Iterations count views.

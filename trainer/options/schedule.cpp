@@ -8,6 +8,8 @@
 
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
+#include "engine/scene/undrawn.h"
+#include "shaders/shared/limits.h"
 
 namespace darb {
 
@@ -23,6 +25,8 @@ struct RampSize {
 };
 constexpr RampSize kRampSizes[] = {{4, 0.1}, {2, 0.3}};
 constexpr int kSmallestSide = 100;  // px
+// Drops of undrawn splats, in rounds of density control.
+constexpr int kRoundsADrop = 5;
 
 // A run that is shorter than kShortRun is that run in fast motion, at most kMostSpeedup times.
 float speedup_of(const TrainOptions& o) {
@@ -72,6 +76,7 @@ Schedule::Resets resets_of(const TrainOptions& o, float prune_opacity,
 
 Schedule::Schedule(const TrainOptions& o)
     : iterations(o.iterations),
+      last(o.iterations),
       batch(o.batch),
       strategy(o.strategy),
       speedup(speedup_of(o)),
@@ -88,6 +93,8 @@ Schedule::Schedule(const TrainOptions& o)
     initial_scale = o.initial_scale.value_or(defaults.initial_scale);
     prune_opacity = o.prune_opacity.value_or(defaults.prune_opacity);
     rest_every = o.sh_rest_every;
+    undrawn_opacity =
+        undrawn_below(std::min(o.accuracy.value(kAlphaCutoff), double{ALPHA_CUTOFF_DEFAULT}));
 
     degree_interval = sped_up(o.sh_interval, 1'000, speedup);
     rounds.begin = sped_up(o.densify_from, 500, speedup);
@@ -122,7 +129,7 @@ Schedule::Schedule(const TrainOptions& o)
 
 int Schedule::step_end(int iteration) const {
     const int end = iteration / batch * batch + batch;
-    return iteration < iterations ? std::min(end, iterations) : end;
+    return iteration < last ? std::min(end, last) : end;
 }
 
 double Schedule::position_rate(int iteration) const {
@@ -174,7 +181,28 @@ bool Schedule::regularises_unseen(std::size_t photos, int iteration) const {
 
 bool Schedule::averages_after(int iteration) const {
     const int interval = std::clamp(iterations / 160, 1, 10);
-    return iteration > average_begin && (iterations - iteration) % interval == 0;
+    return iteration > average_begin && (last - iteration) % interval == 0;
+}
+
+void Schedule::end_early(int iteration) {
+    if (!averages()) {
+        last = iteration;
+        return;
+    }
+    if (iteration >= average_begin) return;
+    const double of_mean = double(iterations - average_begin) / std::max(average_begin, 1);
+    last = std::min(iterations, iteration + std::max(1, static_cast<int>(iteration * of_mean)));
+    average_begin = iteration;
+}
+
+bool Schedule::drops_undrawn_after(int iteration) const {
+    return strategy_row(strategy).drops_undrawn && rounds.end > rounds.begin &&
+           iteration >= rounds.end && iteration <= average_begin && iteration < last &&
+           iteration % (kRoundsADrop * rounds.interval) == 0;
+}
+
+int Schedule::last_change() const {
+    return strategy_row(strategy).drops_undrawn ? std::max(rounds.end, average_begin) : rounds.end;
 }
 
 std::vector<RampStep> Schedule::ramp_steps(int longest_side) const {

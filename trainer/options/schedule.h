@@ -53,8 +53,18 @@ class Schedule {
 
     /// Whether the run ends with the mean of its last splats, and whether that takes in what this
     /// iteration leaves.
-    bool averages() const { return average_begin < iterations; }
+    bool averages() const { return average_begin < last; }
     bool averages_after(int iteration) const;
+    /// The run is to end sooner than its options say, with a mean that begins after this iteration
+    /// and takes as large a share of the run as it would have; at once where it ends without.
+    /// Nothing where its mean has begun. Rates stay as the whole run has them.
+    void end_early(int iteration);
+
+    /// Whether splats go after this iteration that nothing draws any more: every so many iterations
+    /// from the end of growth until the mean begins, which takes in the same splats throughout.
+    bool drops_undrawn_after(int iteration) const;
+    /// The last iteration with a round of density control or such a drop after it, or less.
+    int last_change() const;
 
     /// The steps of the resolution ramp, smallest photos first: a quarter of the sides in the first
     /// tenth of the run, half up to 3/10 of it, the longest side never below 100 px; none where it
@@ -69,10 +79,14 @@ class Schedule {
     int step_end(int iteration) const;
 
     int iterations;
+    int last = 0;  // the run ends with it: `iterations`, or sooner after end_early()
     int batch = 1;
     Strategy strategy;
     // Where they are not given, the strategy's.
     float initial_opacity = 0, initial_scale = 0, prune_opacity = 0;
+    /// The opacity below which a splat is drawn by nobody: neither in training nor where pictures
+    /// are drawn by default.
+    double undrawn_opacity = 0;
     int rest_every = 1;  // see TrainOptions::sh_rest_every
     /// How many times faster a run below kShortRun iterations learns shapes and opacities, grows,
     /// and comes to its degrees of colour: at most kMostSpeedup times.

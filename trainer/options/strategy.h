@@ -92,6 +92,9 @@ struct StrategyRow {
     bool follows_3dgs = false;
     /// Splats grow to a number that is given, or that the first row is forecast to end with.
     bool grows_to_limit = true;
+    /// Once growth is over, splats go from time to time that nothing draws any more. Where a number
+    /// was asked for, they stay.
+    bool drops_undrawn = false;
     /// The first round takes most of a random start.
     bool prunes_random_start = true;
 

@@ -67,6 +67,7 @@ std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& o
 TrainResult follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
                             const RunOptions& run, const std::atomic<bool>* stop,
                             std::vector<ImageU8> photos) {
+    check_gain_watch(dataset, options, run.ranks);
     photos = photos_of_run(dataset, options, std::move(photos));
     photo_doubts(dataset, photos);  // throws; the first rank says them
     const std::string fingerprint = dataset_fingerprint(dataset, photos);

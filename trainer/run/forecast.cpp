@@ -230,9 +230,9 @@ std::uint64_t splats_with_smaller_photos(const Schedule& schedule, const Forecas
     return std::max<std::uint64_t>(f.start_splats, grown);
 }
 
-// The most of what the end takes; of the last rounds of density control, with the colour that there
-// is by then; and of the first iterations, with smaller photos or before most of a random start
-// goes. photos: as add_photos counts them, the ramp's smaller ones among them.
+// The most of what the end takes; of the last rounds of density control and drops of splats, with
+// the colour that there is by then; and of the first iterations, with smaller photos or before most
+// of a random start goes. photos: as add_photos counts them, the ramp's smaller ones among them.
 void find_peak(const Device& device, const TrainOptions& options, const MemoryDemand& photos,
                Forecast& f) {
     const Schedule schedule(options);
@@ -244,7 +244,7 @@ void find_peak(const Device& device, const TrainOptions& options, const MemoryDe
     };
     MemoryDemand rounds = f.demand;
     rounds.averages = false;
-    rounds.sh_degree = predict_degree(options, schedule.rounds.end);
+    rounds.sh_degree = predict_degree(options, schedule.last_change());
     if (rounds.densifies) take_larger(rounds);
     if (photos.small_cameras == 0 && !f.falls) return;
     MemoryDemand early = rounds;

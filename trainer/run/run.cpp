@@ -27,6 +27,7 @@
 #include "trainer/run/run_folder.h"
 #include "trainer/run/run_log.h"
 #include "trainer/step/checkpoint.h"
+#include "trainer/step/gain_watch.h"
 
 namespace darb {
 
@@ -77,6 +78,7 @@ class Run {
                                        first_model(dataset, options, checkpoint_, run.start),
                                        options, run.ranks, run.frozen);
                                })),
+          watch_(options, Schedule(options)),
           log_(run.output),
           progress_(1, options.iterations, run.quiet) {
         for (std::size_t i = 0; i < photos_.size(); ++i)  // the others are where steps read them
@@ -101,6 +103,7 @@ class Run {
     void begin();
     void train(const std::atomic<bool>* stop);
     void after_step(int begin);
+    void look_for_gain(int iteration);
     void save_what_is_there(bool failed);
     bool is_finished() const;
     TrainResult finished();
@@ -131,6 +134,7 @@ class Run {
     const std::string tuning_;              // of this device, before the checkpoint's is used
     std::optional<Checkpoint> checkpoint_;  // to go on with, until resume()
     Trainer trainer_;
+    GainWatch watch_;
     RunLog log_;
     Progress progress_;
     TrainResult summary_;
@@ -160,6 +164,11 @@ void Run::resume() {
     checkpoint_.reset();
     check_resumable(checkpoint, run_.resume_from, options_, dataset_, fingerprint_);
     trainer_.restore(checkpoint.state);
+    watch_.restore(checkpoint.gain);
+    if (watch_.state().end > 0) {
+        trainer_.end_early(watch_.state().looks.back().iteration);
+        summary_.ended_early = watch_.reason();
+    }
     told_divisor_ = trainer_.resolution_divisor();
     seconds_ = checkpoint.seconds;
     const bool own = is_own(run_.resume_from, run_.output);
@@ -221,6 +230,14 @@ void Run::save_model(int iteration) {
     if (const std::size_t lost = drop_non_finite(model); lost > 0)
         progress_.warn(fmt::format("{} splats with NaN or infinity are left out of {}", lost,
                                    summary_.model.string()));
+    // Those that are frozen keep their numbers, by which they are taken out again.
+    const std::size_t all = model.size();
+    summary_.undrawn = drop_undrawn(Schedule(options_).undrawn_opacity, run_.frozen, model);
+    summary_.saved = model.size();
+    if (summary_.undrawn > 0)
+        progress_.note(
+            fmt::format("{} of {} splats are too transparent to be drawn and are left out of {}",
+                        summary_.undrawn, all, summary_.model.string()));
     if (model.size() == 0)
         progress_.warn("no splat is left: " + summary_.model.string() + " is empty");
     while_doing(summary_.model.string(), [&] { write_ply(summary_.model, model); });
@@ -240,7 +257,7 @@ void Run::write_cameras() {
 void Run::save_checkpoint(const std::filesystem::path& path) {
     stopwatch(false);
     write_checkpoint(path, {trainer_.state(), settings_text(options_), fingerprint_, seconds_,
-                            result_tuning(device_)});
+                            result_tuning(device_), watch_.state()});
     stopwatch(true);
 }
 
@@ -255,9 +272,10 @@ void Run::show_step() {
 // Whether metrics.json is that of a whole run, which nothing is to be added to.
 bool Run::is_finished() const {
     const std::filesystem::path path = run_.output / "metrics.json";
-    if (trainer_.iteration() < options_.iterations || !std::filesystem::exists(path)) return false;
+    if (trainer_.iteration() < trainer_.last_iteration() || !std::filesystem::exists(path))
+        return false;
     const RunEnd end = read_run_end(path);
-    return !end.interrupted && end.iteration == options_.iterations;
+    return !end.interrupted && end.iteration == trainer_.last_iteration();
 }
 
 // Nothing is left to do but a report that could not be written then.
@@ -303,13 +321,14 @@ TrainResult Run::execute(const std::atomic<bool>* stop) {
         save_what_is_there(true);
         throw;
     }
-    summary_.interrupted = trainer_.iteration() < options_.iterations;
+    summary_.interrupted = trainer_.iteration() < trainer_.last_iteration();
     if (summary_.interrupted) save_what_is_there(false);
     report_troubles();
     report_cameras();
     progress_.finish();
     summary_.iteration = trainer_.iteration();
     summary_.seconds = seconds_;
+    summary_.dropped = trainer_.counters().undrawn;
     summary_.passes = log_.passes(trainer_);
     summary_.report = log_.finish(summary_, trainer_, device_, run_.report);
     return summary_;
@@ -318,7 +337,7 @@ TrainResult Run::execute(const std::atomic<bool>* stop) {
 // failed: by something else than the device, as a full disk, which may have room for one of the
 // two; what cannot be saved is left out, for the run ends with the first failure.
 void Run::save_what_is_there(bool failed) {
-    if (!whole_ || trainer_.iteration() >= options_.iterations) return;
+    if (!whole_ || trainer_.iteration() >= trainer_.last_iteration()) return;
     std::string saved;
     const auto save = [&](const char* what, const auto& write) {
         try {
@@ -349,7 +368,7 @@ void Run::train(const std::atomic<bool>* stop) {
     const std::filesystem::path latest = run_.output / "checkpoint.darb";
     stopwatch(true);
     // A checkpoint of the run's end that was made in another folder.
-    if (const int end = options_.iterations;
+    if (const int end = trainer_.last_iteration();
         trainer_.iteration() == end && !std::filesystem::exists(model_path(end))) {
         evaluate(end);
         save_model(end);
@@ -360,7 +379,7 @@ void Run::train(const std::atomic<bool>* stop) {
     const std::uint64_t sent = ranks ? ranks->sent_bytes() : 0;
     const double waited = ranks ? ranks->seconds() : 0;
     const auto is_over = [&] {
-        if (trainer_.iteration() >= options_.iterations) return true;
+        if (trainer_.iteration() >= trainer_.last_iteration()) return true;
         whole_ = false;  // a rank that differs: whose splats are right, nobody knows
         const bool stops = is_to_stop(trainer_, run_.ranks, stop && stop->load());
         whole_ = true;
@@ -393,7 +412,8 @@ void Run::after_step(int begin) {
     if (run_.look_again && !run_.ranks.all && i >= kLooksAgainAt &&
         trainer_.resolution_divisor() == 1 && !std::exchange(looked_at_forms_, true))
         look_at_forms();
-    const bool last = i == options_.iterations;
+    if (watch_.is_due(begin, i)) look_for_gain(i);
+    const bool last = i == trainer_.last_iteration();
     if (last || contains(run_.test_iterations, begin, i)) evaluate(i);
     if (last || contains(run_.save_iterations, begin, i)) save_model(i);
     if (contains(run_.checkpoint_iterations, begin, i))
@@ -424,6 +444,23 @@ void Run::look_at_forms() {
                             "are kept for the runs that follow",
                             names_text(seen.choice)));
     } catch (const NoRoom&) {  // a run that leaves no room for it is no place to measure
+    }
+    stopwatch(true);
+}
+
+// The mean is not there yet: looks are compared with each other, and not with the end.
+void Run::look_for_gain(int iteration) {
+    stopwatch(false);
+    const double psnr_db = evaluate_held_out(trainer_, dataset_, photos_).psnr_db;
+    log_.look(iteration, psnr_db);
+    if (!std::isnan(psnr_db) && watch_.add({iteration, psnr_db})) {
+        trainer_.end_early(iteration);
+        watch_.set_end(trainer_.last_iteration());
+        summary_.ended_early = watch_.reason();
+        log_.ends_early(iteration, trainer_.last_iteration(), summary_.ended_early);
+        progress_.note(fmt::format("iteration {}: the run ends with iteration {} of {}: {}",
+                                   iteration, trainer_.last_iteration(), options_.iterations,
+                                   summary_.ended_early));
     }
     stopwatch(true);
 }
@@ -499,6 +536,7 @@ TrainResult run_training(Device& device, const Dataset& dataset, const TrainOpti
         check_frame(device, view.camera.width, view.camera.height, view.name);
     if (run.ranks.several() && !run.ranks.all->is_first())
         return follow_training(device, dataset, options, run, stop, std::move(photos));
+    check_gain_watch(dataset, options, run.ranks);
     check_run_folder(run.output, dataset);
     if (run.resume_from.empty() && !run.start) check_start_memory(device, dataset, options);
     return Run(device, dataset, options, run, std::move(photos)).execute(stop);

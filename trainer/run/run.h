@@ -74,6 +74,10 @@ struct TrainResult {
     std::uint64_t sent_bytes = 0;
     double exchange_seconds = 0;
     std::filesystem::path model;  // the last PLY written
+    std::string ended_early;      // why the run ended itself; empty: it did not
+    // Splats in it, and those that were left out as nothing draws them.
+    std::size_t saved = 0, undrawn = 0;
+    std::size_t dropped = 0;  // that left the run for the same reason
     std::vector<ReportPicture>
         pictures;  // held-out views beside their photos, of the last evaluation
     std::filesystem::path report;

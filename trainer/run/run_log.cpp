@@ -211,6 +211,14 @@ void RunLog::mean_left_out(int iteration) {
     write({{"event", "mean_left_out"}, {"iteration", iteration}});
 }
 
+void RunLog::look(int iteration, double psnr_db) {
+    write({{"event", "look"}, {"iteration", iteration}, {"psnr_db", psnr_db}});
+}
+
+void RunLog::ends_early(int iteration, int end, const std::string& reason) {
+    write({{"event", "ends_early"}, {"iteration", iteration}, {"end", end}, {"reason", reason}});
+}
+
 void RunLog::failure(int iteration, const std::string& what) {
     try {
         write({{"event", "failure"}, {"iteration", iteration}, {"what", shared_text(what)}});
@@ -277,6 +285,9 @@ void add_events(const std::vector<Json>& events, ReportData& data) {
         if (const Json arc = e.value("arc", Json::object()); kind == "evaluation" && !arc.empty())
             data.arcs.push_back({e.value("iteration", 0), number(arc, "psnr_db"),
                                  number(arc, "ssim"), arc.value("views", 0u)});
+        if (kind == "ends_early")
+            data.notes.push_back(fmt::format("The run ended itself at iteration {}: {}.",
+                                             e.value("end", 0), e.value("reason", "")));
         if (kind == "resolution") {
             const int divisor = e.value("divisor", 1);
             sizes += fmt::format("{}{} from iteration {}", sizes.empty() ? "" : ", ",
@@ -373,6 +384,9 @@ std::filesystem::path RunLog::finish(const TrainResult& summary, const Trainer& 
                  {"seconds", summary.seconds},
                  {"ms_per_iteration", summary.seconds * 1000.0 / std::max(summary.iteration, 1)},
                  {"splats", trainer.splat_count()},
+                 {"saved_splats", summary.saved},
+                 {"undrawn_splats", summary.undrawn},
+                 {"dropped_splats", c.undrawn},
                  {"strategy", start_.value("strategy", std::string(strategy_name(Strategy{})))},
                  {"passes_ms", passes},
                  {"peak_device_bytes", device.peak_bytes()},
@@ -393,6 +407,7 @@ std::filesystem::path RunLog::finish(const TrainResult& summary, const Trainer& 
                  {"sh_probes", probes_of(events_)},
                  {"sh_degree", trainer.sh_degree()},
                  {"evaluations", evaluations}};
+    if (!summary.ended_early.empty()) metrics["ended_early"] = summary.ended_early;
     if (const std::optional<CameraMoves> m = trainer.camera_moves())
         metrics["cameras"] = {{"refined", m->cameras},
                               {"median_px", m->median_px},

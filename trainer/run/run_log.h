@@ -54,6 +54,9 @@ class RunLog {
     void growth_stopped(int iteration, const char* limit, std::uint32_t splats);
     /// There was no room for the mean that the run was to end with.
     void mean_left_out(int iteration);
+    /// Of a run that may end itself: what held-out photos are at, and that it ends.
+    void look(int iteration, double psnr_db);
+    void ends_early(int iteration, int end, const std::string& reason);
     /// What ended the run before its time; nothing where the log cannot be written.
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);

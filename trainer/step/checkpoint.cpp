@@ -58,6 +58,20 @@ std::uint32_t checksum(std::span<const std::byte> bytes, std::uint32_t before = 
     return static_cast<std::uint32_t>(crc);
 }
 
+Json gain_json(const GainState& gain) {
+    Json looks = Json::array();
+    for (const GainLook& look : gain.looks) looks.push_back({look.iteration, look.psnr_db});
+    return {{"looks", looks}, {"end", gain.end}};
+}
+
+GainState gain_from_json(const Json& json) {
+    GainState gain;
+    gain.end = json.at("end").get<int>();
+    for (const Json& look : json.at("looks"))
+        gain.looks.push_back({look.at(0).get<int>(), look.at(1).get<double>()});
+    return gain;
+}
+
 Json header_of(const Checkpoint& c) {
     const SplatModel& m = c.state.model;
     const TrainCounters& n = c.state.counters;
@@ -80,12 +94,14 @@ Json header_of(const Checkpoint& c) {
                 {"tuning", c.tuning},
                 {"counters", {n.redone_iterations, n.bad_gradients, n.cloned_or_split, n.pruned}},
                 {"culled", n.culled},
+                {"undrawn", n.undrawn},
                 {"overflows", n.overflows},
                 {"longest_list", n.longest_list},
                 {"huge_splats", n.huge_splats},
                 {"most_pairs", n.most_intersections}};
     if (const KernelDefinition* own = kernel_definition(m.kernel))
         header["kernel_definition"] = definition_json(*own);
+    if (!c.gain.looks.empty()) header["gain"] = gain_json(c.gain);
     return header;
 }
 
@@ -133,12 +149,14 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     c.settings = h.at("settings").get<std::string>();
     c.dataset = h.at("dataset").get<std::string>();
     c.tuning = h.value("tuning", c.tuning);
+    if (h.contains("gain")) c.gain = gain_from_json(h["gain"]);
     TrainCounters& n = c.state.counters;
     n.redone_iterations = h.at("counters").at(0).get<std::uint64_t>();
     n.bad_gradients = h.at("counters").at(1).get<std::uint64_t>();
     n.cloned_or_split = h.at("counters").at(2).get<std::uint64_t>();
     n.pruned = h.at("counters").at(3).get<std::uint64_t>();
     n.overflows = h.value("overflows", std::uint64_t{0});  // absent in earlier files
+    n.undrawn = h.value("undrawn", 0u);
     n.longest_list = h.value("longest_list", 0u);
     n.huge_splats = h.value("huge_splats", 0u);
     n.most_intersections = h.value("most_pairs", 0u);
@@ -310,8 +328,24 @@ namespace {
 
 constexpr const char* kOtherCheckpoint = "Start from another checkpoint, or without --resume.";
 
+// Of the looks at held-out photos, and of the end that follows from the last of them.
+std::string gain_contradiction(const GainState& gain, int iteration, const TrainOptions& o) {
+    if (gain.looks.empty() && gain.end == 0) return "";
+    if (o.end_without_gain == 0 || gain.looks.empty())
+        return "holds the end of a run that does not look for a gain";
+    const int looked = gain.looks.back().iteration;
+    Schedule schedule(o);
+    if (gain.end != 0) schedule.end_early(looked);
+    if (looked > iteration || iteration > schedule.last ||
+        (gain.end != 0 && gain.end != schedule.last))
+        return fmt::format("is of iteration {}, looked for a gain at {} and ends the run at {}",
+                           iteration, looked, gain.end);
+    return "";
+}
+
 // What the settings say and the state does not follow, which no run writes.
-std::string contradiction(const TrainerState& s, const TrainOptions& o, size_t photos) {
+std::string contradiction(const Checkpoint& checkpoint, const TrainOptions& o, size_t photos) {
+    const TrainerState& s = checkpoint.state;
     const SplatModel& m = s.model;
     if (m.kernel != o.kernel || m.footprint != o.footprint)
         return fmt::format(
@@ -332,6 +366,8 @@ std::string contradiction(const TrainerState& s, const TrainOptions& o, size_t p
         (!s.cameras.empty() && !o.refine_cameras) ||
         (!s.rest_sum.empty() && Schedule(o).rest_every <= 1))
         return "holds what the run's effects and strategy have no use for";
+    if (const std::string what = gain_contradiction(checkpoint.gain, s.iteration, o); !what.empty())
+        return what;
     if (std::int64_t{s.averaged} > s.iteration)
         return fmt::format("holds a mean of {} iterations after {}", s.averaged, s.iteration);
     size_t finite = 0;
@@ -389,7 +425,7 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
             "or start without --resume.");
     const auto photos = static_cast<size_t>(
         std::ranges::count_if(dataset.views, [](const View& v) { return !v.is_test; }));
-    if (const std::string what = contradiction(checkpoint.state, options, photos); !what.empty())
+    if (const std::string what = contradiction(checkpoint, options, photos); !what.empty())
         throw Error(path.string(), what, kOtherCheckpoint);
 }
 

@@ -10,6 +10,7 @@
 
 #include "engine/data/dataset.h"
 #include "trainer/options/options.h"
+#include "trainer/step/gain_watch.h"
 #include "trainer/step/trainer_state.h"
 
 namespace darb {
@@ -20,6 +21,7 @@ struct Checkpoint {
     std::string dataset;                       // dataset_fingerprint() of it
     double seconds = 0;                        // of training until then
     std::string tuning = "backward=subgroup";  // result_tuning(): the only ones of older files
+    GainState gain = {};                       // of a run with end_without_gain
 };
 
 /// What a file holds.

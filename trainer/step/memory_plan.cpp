@@ -333,6 +333,11 @@ void MemoryBudget::end_round(std::uint32_t splats) {
     if (within_memory_ == limit_ && splats >= within_memory_) stopped_by_memory_ = within_memory_;
 }
 
+bool MemoryBudget::has_room_for_round(const HeldMemory& held) const {
+    if (!options_.max_memory_bytes) return true;
+    return round_peak(*device_, demand(held), held.splats, held.splats) <= bytes_to_plan(held);
+}
+
 bool MemoryBudget::has_room_for_degree(const HeldMemory& held, int degree) const {
     if (!options_.max_memory_bytes) return true;
     MemoryDemand wanted = demand(held);

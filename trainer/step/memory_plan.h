@@ -142,6 +142,8 @@ class MemoryBudget {
     /// The same where frames came near the intersections that the device's bindings hold.
     std::uint32_t stopped_by_intersections() const { return stopped_by_intersections_; }
 
+    /// Whether a round of density control that adds nothing stays within max_memory_bytes.
+    bool has_room_for_round(const HeldMemory& held) const;
     bool has_room_for_degree(const HeldMemory& held, int degree) const;
 
   private:

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -115,6 +116,7 @@ StepInput Trainer::input_for(int iteration, int view, int last) const {
     input.view = photos_.view(view, degree_at(last), background_for(iteration));
     input.adam = optimizer_.step(last);
     input.adam.clearance = static_cast<float>(options_.clearance * photos_.nearest_distance(view));
+    input.adam.splats_gone = totals_.counters.undrawn;
     input.exposure_rate = static_cast<float>(schedule_.exposure_rate(iteration));
     input.exposure_visits = (iteration - 1) / static_cast<int>(photos_.count()) + 1;
     input.strategy = strategy_.get();
@@ -220,10 +222,13 @@ std::optional<DensityResult> Trainer::control_density() {
     const int end = std::min(iteration_, schedule_.rounds.end - 1);
     const int round = last_in(begin, end, [&](int i) { return schedule_.refines_after(i); });
     const int reset = last_in(begin, end, [&](int i) { return schedule_.resets_after(i); });
-    if (round == 0 && reset == 0) return std::nullopt;
+    const bool drops =
+        last_in(begin, iteration_, [&](int i) { return schedule_.drops_undrawn_after(i); }) > 0;
+    if (round == 0 && reset == 0 && !drops) return std::nullopt;
     drain();
     std::optional<DensityResult> result;
     if (round > 0) result = run_round(round);
+    if (round == 0 && drops) result = drop_undrawn();
     if (reset > 0) density_.reset_opacity(splats_, schedule_.resets.to);
     return result;
 }
@@ -257,15 +262,37 @@ DensityResult Trainer::run_round(int iteration) {
     const DensityResult result = strategy_->round(
         {splats_, density_, step_.gradient_sum(), round_args(iteration), iteration, limit});
     memory_.end_round(result.after);
+    end_round(result);
+    reorder();
+    step_.clear_gradient_sum();
+    return result;
+}
+
+DensityResult Trainer::end_round(const DensityResult& result) {
     totals_.counters.cloned_or_split += result.grown;
     totals_.counters.pruned += result.pruned;
     if (result.grown > 0 || result.pruned > 0) {
         memory_.record_round(held(), result.before);
         if (smoothing_) smoothing_->mark_stale();
     }
-    reorder();
-    step_.clear_gradient_sum();
     return result;
+}
+
+// What is below that opacity gets no gradient and never comes back; the regulariser takes it there
+// once no photo holds it up. Pictures and the other splats keep their bits by this, but where the
+// smoothing filter is found anew.
+std::optional<DensityResult> Trainer::drop_undrawn() {
+    const bool has_room = memory_.has_room_for_round(held());
+    if (ranks_.several() ? least(*ranks_.all, has_room ? 1 : 0) == 0 : !has_room)
+        return std::nullopt;
+    gpu::DensifyArgs args{};
+    args.gradient_threshold = std::numeric_limits<float>::max();
+    args.prune_opacity = static_cast<float>(schedule_.undrawn_opacity);
+    const DensityResult result = density_.run(splats_, step_.gradient_sum(), args, 0);
+    if (result.pruned == 0) return std::nullopt;
+    totals_.counters.undrawn += result.pruned;
+    step_.clear_gradient_sum();
+    return end_round(result);
 }
 
 void Trainer::reorder() {
@@ -310,9 +337,10 @@ void Trainer::probe_degree() {
         .step =
             [this](int iteration, int view, float share) {
                 StepInput input = input_for(iteration, view, iteration);
-                const float clearance = input.adam.clearance;
+                const AdamStep usual = input.adam;
                 input.adam = optimizer_.trial_step(iteration, share);
-                input.adam.clearance = clearance;
+                input.adam.clearance = usual.clearance;
+                input.adam.splats_gone = usual.splats_gone;
                 step_.run(input);
             },
         .photo_psnr =
@@ -338,7 +366,7 @@ void Trainer::average() {
         return;
     }
     memory_.record_peak(held());
-    if (iteration_ < options_.iterations) return;
+    if (iteration_ < schedule_.last) return;
     average_.swap(splats_);
     average_.clear();
 }

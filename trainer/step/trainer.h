@@ -113,6 +113,11 @@ class Trainer {
 
     /// Iterations finished or under way.
     int iteration() const { return iteration_; }
+    /// The iteration that the run ends with: that of the options, or sooner after end_early().
+    int last_iteration() const { return schedule_.last; }
+    /// The run is to end sooner, as Schedule::end_early() has it. Not part of state(): after
+    /// restore(), call it again with the same iteration.
+    void end_early(int iteration) { schedule_.end_early(iteration); }
     int views_a_step() const { return options_.batch; }
     std::uint32_t splat_count() const { return splats_.count(); }
     /// On the device, for work on the same queue between steps; the object stays, its buffers are
@@ -166,6 +171,8 @@ class Trainer {
     void finish(const StepOutcome& outcome);
     std::optional<DensityResult> control_density();
     DensityResult run_round(int iteration);
+    std::optional<DensityResult> drop_undrawn();
+    DensityResult end_round(const DensityResult& result);
     void open_step();
     void follow_first();
     gpu::DensifyArgs round_args(int iteration) const;

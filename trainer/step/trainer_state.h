@@ -19,7 +19,8 @@ struct TrainCounters {
     std::uint32_t huge_splats = 0;         // most in any frame
     std::uint32_t most_intersections = 0;  // of splats and tiles, most in any frame
     std::uint64_t bad_gradients = 0;
-    std::uint64_t cloned_or_split = 0, pruned = 0;     // where splats move: new, moved
+    std::uint64_t cloned_or_split = 0, pruned = 0;  // where splats move: new, moved
+    std::uint32_t undrawn = 0;  // of the pruned: those that went after growth, as nothing drew them
     std::array<std::uint64_t, CULL_REASONS> culled{};  // summed over frames, by reason
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "engine/scene/edit_splats.h"
 
+#include <cmath>
 #include <limits>
 
 #include "shaders/shared/limits.h"
@@ -201,6 +202,25 @@ TEST(EditSplats, crop_prune_and_degree) {
     for (size_t c = 0; c < 9; ++c) EXPECT_EQ(model.sh_rest[9 + c], third[45 + c]);
     limit_sh_degree(2, model);
     EXPECT_EQ(model.sh_degree, 1);  // none are made up
+}
+
+// What is as opaque as the limit is drawn, and what float32 may take for that stays.
+TEST(EditSplats, undrawn_splats_go_but_for_the_first_and_those_near_the_limit) {
+    SplatModel model = sample_model(1, 6);
+    const auto logit = [](double opacity) {
+        return static_cast<float>(std::log(opacity / (1 - opacity)));
+    };
+    const double cutoff = ALPHA_CUTOFF_DEFAULT;
+    model.opacity_logit = {
+        -9, logit(0.5), -9, logit(cutoff), logit(cutoff * (1 - 1e-6)), logit(cutoff * 0.999)};
+    const SplatModel before = model;
+    EXPECT_EQ(drop_undrawn(cutoff, 1, model), 2u);
+    EXPECT_EQ(model.opacity_logit,
+              (std::vector<float>{before.opacity_logit[0], before.opacity_logit[1],
+                                  before.opacity_logit[3], before.opacity_logit[4]}));
+    EXPECT_EQ(model.position[6], before.position[9]) << "all that is of a splat goes with it";
+    EXPECT_EQ(drop_undrawn(cutoff, 0, model), 1u);
+    EXPECT_EQ(drop_undrawn(cutoff, 0, model), 0u);
 }
 
 TEST(EditSplats, splats_with_nan_go) {

@@ -51,7 +51,7 @@ class CheckpointFile : public testing::Test {
         for (int a = 0; a < kAttributeCount; ++a)
             c.state.mean.emplace_back(attribute_values(c.state.model, a).size(), 0.25f);
         c.state.averaged = 6;
-        c.state.counters = {1, 8, 9, 10, 11, 2, 3, 4, {5, 6, 7}};
+        c.state.counters = {1, 8, 9, 10, 11, 2, 3, 4, 12, {5, 6, 7}};
         c.settings = settings_text(options_of_run());
         c.dataset = "0123456789abcdef";
         c.seconds = 98.5;
@@ -85,7 +85,8 @@ class CheckpointFile : public testing::Test {
 
 TEST_F(CheckpointFile, what_is_written_comes_back) {
     for (const size_t splats : {size_t{0}, size_t{1}, size_t{7}}) {
-        const Checkpoint c = checkpoint(splats);
+        Checkpoint c = checkpoint(splats);
+        c.gain = {{{100, 25.1}, {200, 25.0 + 1 / 3.}}, 300};
         written(c);
         const Checkpoint back = read_checkpoint(path_);
         EXPECT_EQ(back.state.iteration, 1234);
@@ -101,6 +102,11 @@ TEST_F(CheckpointFile, what_is_written_comes_back) {
         EXPECT_EQ(back.state.counters.culled, c.state.counters.culled);
         EXPECT_EQ(back.state.counters.pruned, 4U);
         EXPECT_EQ(back.state.counters.most_intersections, 11U);
+        EXPECT_EQ(back.state.counters.undrawn, 12U);
+        ASSERT_EQ(back.gain.looks.size(), 2U);
+        EXPECT_EQ(back.gain.looks[1].iteration, 200);
+        EXPECT_EQ(back.gain.looks[1].psnr_db, 25.0 + 1 / 3.) << "to the bit";
+        EXPECT_EQ(back.gain.end, 300);
         EXPECT_EQ(back.settings, c.settings);
         EXPECT_EQ(back.dataset, c.dataset);
         EXPECT_EQ(back.seconds, 98.5);

@@ -23,7 +23,8 @@ std::string other_value(const OptionRow& row) {
         return defaults.*std::get<bool TrainOptions::*>(row.member) ? "off" : "on";
     }
     if (row.is_size) return "1.5GB";
-    return row.most == 1 ? "0.5" : row.most == 3 ? "2" : row.least >= 1 ? "8" : "0.75";
+    const bool counts = std::holds_alternative<int TrainOptions::*>(row.member) || row.least >= 1;
+    return row.most == 1 ? "0.5" : row.most == 3 ? "2" : counts ? "8" : "0.75";
 }
 
 bool is_whole(const OptionRow& row) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <utility>
+#include <vector>
 
 #include "engine/core/error.h"
 
@@ -43,6 +44,65 @@ TEST(OpacityReset, the_last_one_by_the_length_of_the_run) {
     options.densify_until.reset();
     use_3dgs_schedule(options);
     EXPECT_EQ(Schedule(options).resets.last, 3'000);
+}
+
+TEST(UndrawnSplats, go_between_the_end_of_growth_and_the_mean) {
+    const auto drops = [](const Schedule& schedule) {
+        std::vector<int> all;
+        for (int i = 0; i <= schedule.iterations; ++i)
+            if (schedule.drops_undrawn_after(i)) all.push_back(i);
+        return all;
+    };
+    TrainOptions options;
+    options.iterations = 7'000;
+    EXPECT_EQ(drops(Schedule(options)), (std::vector<int>{3'500, 4'000, 4'500, 5'000, 5'500}));
+    EXPECT_EQ(Schedule(options).last_change(), 5'950);
+    options.iterations = 1'600;
+    EXPECT_EQ(drops(Schedule(options)), (std::vector<int>{800, 1'000, 1'200}));
+    options.average_from = 1;
+    EXPECT_EQ(drops(Schedule(options)), (std::vector<int>{800, 1'000, 1'200, 1'400}))
+        << "not where it ends";
+    options.densify_until = 0;
+    EXPECT_TRUE(drops(Schedule(options)).empty()) << "without density control the number stays";
+    options.densify_until.reset();
+    options.strategy = Strategy::budget;
+    EXPECT_TRUE(drops(Schedule(options)).empty()) << "and where a number was asked for";
+    EXPECT_EQ(Schedule(options).last_change(), Schedule(options).rounds.end);
+}
+
+TEST(UndrawnSplats, are_those_that_neither_training_nor_pictures_draw) {
+    TrainOptions options;
+    EXPECT_NEAR(Schedule(options).undrawn_opacity, 1 / 255., 1e-6);
+    EXPECT_LT(Schedule(options).undrawn_opacity, 1 / 255.);
+    options.accuracy.choice[kAlphaCutoff] = find_choice(kAlphaCutoff, "1/1024");
+    EXPECT_LT(Schedule(options).undrawn_opacity, 1 / 1024.);
+    options.accuracy.choice[kAlphaCutoff] = find_choice(kAlphaCutoff, "1/64");
+    EXPECT_LT(Schedule(options).undrawn_opacity, 1 / 255.) << "pictures draw more than such a run";
+}
+
+TEST(EarlyEnd, moves_the_mean_and_keeps_its_share_and_the_rates) {
+    TrainOptions options;
+    options.iterations = 10'000;
+    const Schedule whole(options);
+    Schedule schedule(options);
+    schedule.end_early(6'800);
+    EXPECT_EQ(schedule.average_begin, 6'800);
+    EXPECT_EQ(schedule.last, 8'000) << "15 % of it are the mean, as of the whole run";
+    EXPECT_TRUE(schedule.averages_after(8'000));
+    EXPECT_FALSE(schedule.averages_after(6'800));
+    for (const int i : {1, 6'000, 7'900}) {
+        EXPECT_EQ(schedule.position_rate(i), whole.position_rate(i));
+        EXPECT_EQ(schedule.rates(i).scale, whole.rates(i).scale);
+    }
+    Schedule late(options);
+    late.end_early(9'000);  // its mean has begun
+    EXPECT_EQ(late.last, 10'000);
+    EXPECT_EQ(late.average_begin, whole.average_begin);
+    options.average_from = 1;
+    Schedule without(options);
+    without.end_early(6'000);
+    EXPECT_EQ(without.last, 6'000) << "no mean is to come";
+    EXPECT_FALSE(without.averages());
 }
 
 TEST(Speedup, a_short_run_learns_and_grows_faster) {
