@@ -100,8 +100,6 @@ void recall_request(const std::vector<std::string>& typed, TrainRequest& request
     constexpr std::array<std::string_view, 12> kBeside{
         "--resume", "-o",      "-m",     "--output", "--model-path", "--device",
         "-q",       "--quiet", "--view", "--tune",   "--retune",     "--verbose"};
-    refuse(r.train.end_without_gain > 0, "--end-without-gain",
-           "Leave it out: blocks are joined when each has done its iterations.");
     for (const std::string& word : typed) {
         const std::string_view name = std::string_view(word).substr(0, word.find('='));
         if (name.starts_with('-') &&
@@ -271,6 +269,8 @@ void check_for_blocks(const TrainRequest& r, const RunShown& shown) {
     refuse(!r.save_iterations.empty(), "--save-iterations", kAfter);
     refuse(!r.checkpoint_iterations.empty(), "--checkpoint-iterations",
            "Leave it out; --checkpoint-interval is for each block.");
+    refuse(r.train.end_without_gain > 0, "--end-without-gain",
+           "Leave it out: blocks are joined when each has done its iterations.");
     refuse(shown.verbose, "--verbose", "Leave it out: each block's metrics.json has its passes.");
     refuse(r.allow_mixed, "--allow-mixed", "Leave it out: each block is trained on one rank.");
     refuse(r.train.start == StartPoints::dense || r.train.start == StartPoints::random,
