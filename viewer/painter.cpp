@@ -447,12 +447,15 @@ void Painter::rehearse_motion(const PictureKey& key) {
 void Painter::presented() {
     FrameTimes& t = session_->times;
     t.frame_ms = milliseconds_since(frame_start_);
-    if (under_way_.empty() || !pacing_.in_motion()) return;
-    Started& started = under_way_.back();
-    if (started.frame != frame_ || !started.counts) return;
-    started.frame_ms = t.frame_ms;
-    t.moving_ms.push_back(t.frame_ms);
-    if (t.moving_ms.size() > kTimesKept) t.moving_ms.pop_front();
+    if (!under_way_.empty() && pacing_.in_motion()) {
+        Started& started = under_way_.back();
+        if (started.frame == frame_ && started.counts) {
+            started.frame_ms = t.frame_ms;
+            t.moving_ms.push_back(t.frame_ms);
+            if (t.moving_ms.size() > kTimesKept) t.moving_ms.pop_front();
+        }
+    }
+    take_results();  // some drivers present when all is done, lavapipe among them
 }
 
 std::optional<ImageU8> Painter::picture_alone(int width, int height, bool of_run) {
