@@ -31,6 +31,7 @@ constexpr OfCommand kOfCommand[] = {
     {"resume", "Give start_checkpoint=path."},
     {"sequential", "Photos without cameras go through `darb train` first."},
     {"report", "The command writes reports."},
+    {"end_without_gain", "Call evaluate() and stop when it gains no more."},
     {"test_iterations", "Call evaluate() when you want it."},
     {"save_iterations", "Call scene().write(path) when you want it."},
     {"checkpoint_iterations", "Call checkpoint(path) when you want it."},

@@ -11,6 +11,7 @@
 #include "engine/scene/edit_splats.h"
 #include "tools/python/scene.h"
 #include "tools/python/train_options.h"
+#include "trainer/options/schedule.h"
 #include "trainer/run/evaluation.h"
 #include "trainer/run/follow_run.h"
 #include "trainer/run/forecast.h"
@@ -233,6 +234,7 @@ SplatModel PyTrainer::model() {
     const Training training(*device_);
     SplatModel model = trainer_->model();
     drop_non_finite(model);
+    drop_undrawn(Schedule(job_.options).undrawn_opacity, 0, model);  // as the command saves it
     return model;
 }
 
