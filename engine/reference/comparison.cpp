@@ -66,8 +66,7 @@ constexpr Tolerance kTable[] = {
      "per pixel 1/(3HW); flat windows divide by C2, and sign(x - y) flips where they meet"},
     {"training_loss_float32", 1e-5, 1e-4, 0, 1 - 1e-9, 1e-4,
      "means over an image after steps of Adam, which move a parameter without influence by the "
-     "sign "
-     "of rounding"},
+     "sign of rounding"},
     {"adam_float32", 1e-7, 1e-5, 0, 1 - 1e-9, 1e-5, "two square roots and a division"},
 };
 

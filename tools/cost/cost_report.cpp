@@ -169,8 +169,8 @@ std::string notes(const CostResult& result) {
     return fmt::format(
         "<h2>How to read it</h2>"
         "<p>Times: device timestamps, summed over the passes of a frame, mean over {} views; "
-        "median "
-        "and quartiles of {} or more repeats, all rows turn by turn so that drift hits them alike "
+        "median and quartiles of {} or more repeats, all rows turn by turn so that drift hits them "
+        "alike "
         "({} side by side). Combinations were timed in a second round and divided by what balanced "
         "had drifted by in it, {:.3f}.</p>"
         "<p>Errors: against a renderer in double precision with the true kernel profile, alpha "

@@ -461,8 +461,7 @@ std::string train_cost_html(const TrainCostResult& result) {
         "<div class='plots'>" + svg_plot(ends) + svg_plot(gradients) + svg_plot(curves) +
             "</div>\n" + numbers(result) +
             "<h2>How to read it</h2><p>Each setting alone, the presets, and what training does "
-            "beside "
-            "the settings, each turned the other way; row after row within a "
+            "beside the settings, each turned the other way; row after row within a "
             "seed, so that drift hits all alike. Quartiles over the seeds. Gradient error: "
             "|g - g*| / |g*|, mean over the kinds of parameters, median over three photos, of the "
             "scene that balanced trained, g* in double precision with the true kernel profile, "

@@ -382,12 +382,10 @@ std::string psi_html(const std::vector<PsiResult>& results,
         fmt::format(
             "<h2>How to read it</h2><p>Grid: the paper's experiment, {} random covariances on {}^3 "
             "cells: density within the support, summed along z, its weighted 2D covariance over "
-            "the "
-            "2x2 block of the 3D one; median and standard deviation, for xx, xy and yy apart. "
-            "Exact: a "
-            "third of the ratio of the fourth and the second radial moment. Least squares: the "
-            "scale "
-            "of the covariance that brings the splat nearest to the projection.</p><p>Distances: "
+            "the 2x2 block of the 3D one; median and standard deviation, for xx, xy and yy apart. "
+            "Exact: a third of the ratio of the fourth and the second radial moment. Least "
+            "squares: the scale of the covariance that brings the splat nearest to the "
+            "projection.</p><p>Distances: "
             "between profiles with peak 1 over the image plane, relative L2 and largest. The exact "
             "footprint is evaluated in float32, as the shaders have it.</p>\n",
             options.samples, options.cells);
