@@ -62,11 +62,11 @@ std::string summary_text(const TrainResult& summary, const RunShown& shown,
         text += (quiet ? "" : fmt::format("{:<9}", what)) + path.string() + "\n";
     };
     written("scene", summary.model);
-    if (const std::size_t gone = summary.undrawn + summary.dropped; !quiet && gone > 0)
+    if (!quiet && summary.undrawn + summary.dropped > 0)
         text += fmt::format(
-            "          of {} splats; {} more were left out, as they are too transparent to be "
-            "drawn\n",
-            summary.saved, gone);
+            "         of {} splats; of those too transparent to be drawn {} were left out, and {} "
+            "had left the run before\n",
+            summary.saved, summary.undrawn, summary.dropped);
     if (!summary.pictures.empty()) written("picture", summary.pictures.front().file);
     written("report", summary.report);
     if (summary.interrupted)
