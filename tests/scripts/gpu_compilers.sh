@@ -13,8 +13,8 @@ fi
 tools/lab/gpu_compilers.py check "$dir" --darb "$build/darb"
 worse=$(mktemp -d)
 trap 'rm -rf "$worse"' EXIT
-mkdir -p "$worse/tools" "$worse/assets/results"
-cp tools/lab/gpu_compilers.py "$worse/tools"
+mkdir -p "$worse/tools/lab" "$worse/assets/results"
+cp tools/lab/gpu_compilers.py "$worse/tools/lab"
 sed 's/"registers": 48.0/"registers": 47.0/' assets/results/gpu_passes.json >"$worse/assets/results/gpu_passes.json"
 if "$worse/tools/lab/gpu_compilers.py" check "$dir" navi31 --again --darb "$build/darb" >"$worse/out"; then
     echo "a pass that takes a register more than the table was not found"

@@ -138,7 +138,9 @@ TEST(Limits, growth_stops_before_the_intersections_that_the_bindings_hold) {
         run_to(trainer, 60);
         EXPECT_GT(trainer.counters().most_intersections, most * 7 / 10);
         EXPECT_GT(trainer.stopped_by_intersections(), 300U);
-        EXPECT_EQ(trainer.splat_count(), trainer.stopped_by_intersections());
+        EXPECT_LE(trainer.splat_count(), trainer.stopped_by_intersections());
+        EXPECT_GT(trainer.splat_count(), trainer.stopped_by_intersections() * 9 / 10)
+            << "only splats that no view draws leave once growth has stopped";
     }
 }
 

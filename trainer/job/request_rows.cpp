@@ -102,9 +102,9 @@ std::string preset_help() {
     std::string help;
     for (const RunPreset& preset : kRunPresets)
         help +=
-            fmt::format("{}{}: {}, {} iterations, photos of up to {} px", help.empty() ? "" : "; ",
+            fmt::format("{}{}: {}, {} iterations at up to {} px", help.empty() ? "" : "; ",
                         preset.name, preset.summary, preset.iterations, preset.width);
-    return help + "; --iterations and -r count beside it";
+    return help + "; --iterations and -r overrule it";
 }
 
 std::string strategy_help() {
@@ -239,7 +239,7 @@ void photo_rows(Rows& rows) {
 void run_rows(Rows& rows) {
     rows.push_back(
         {.row = {.flags = "--resume",
-                 .help = "go on from OUT/checkpoint.darb; `darb train --resume -o OUT` is enough",
+                 .help = "go on from OUT/checkpoint.darb",
                  .is_switch = true},
          .place = [](Request& r) -> RequestPlace { return &r.resume; }});
     rows.push_back({.row = {.flags = "--allow-mixed",

@@ -50,9 +50,7 @@ const OptionRow kRows[] = {
      .setting = "/end_without_gain",
      .member = &Opt::end_without_gain,
      .group = option_group::kRun,
-     .help = "the run ends itself when held-out photos gained less than 0.02 dB in so many "
-             "iterations after growth; 0: "
-             "never, so that held-out photos stay a test of their own",
+     .help = "stop once held-out photos gained less than 0.02 dB in so many iterations; 0: never",
      .most = 10'000'000,
      .stands = [](const Opt& o, const Sched&) { return o.end_without_gain > 0; }},
     {.flags = "--batch",
