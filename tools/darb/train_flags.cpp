@@ -81,7 +81,7 @@ void add_own_flags(CLI::App& command, const std::string& behind, TrainFlags& f) 
     if (behind == "--resume") {
         command
             .add_flag("--view", f.shown.view,
-                      "follow the run in a window; closing it goes on training")
+                      "watch the run; closing the window lets it go on")
             ->group(option_group::kRun);
         add_quiet_flag(command, f.shown.quiet)->group(option_group::kRun);
     } else if (behind == "--allow-mixed") {

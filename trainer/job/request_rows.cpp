@@ -101,9 +101,8 @@ std::string shared_images(const Request& r) {
 std::string preset_help() {
     std::string help;
     for (const RunPreset& preset : kRunPresets)
-        help +=
-            fmt::format("{}{}: {}, {} iterations at up to {} px", help.empty() ? "" : "; ",
-                        preset.name, preset.summary, preset.iterations, preset.width);
+        help += fmt::format("{}{}: {}, {} iterations at up to {} px", help.empty() ? "" : "; ",
+                            preset.name, preset.summary, preset.iterations, preset.width);
     return help + "; --iterations and -r overrule it";
 }
 
@@ -238,9 +237,7 @@ void photo_rows(Rows& rows) {
 
 void run_rows(Rows& rows) {
     rows.push_back(
-        {.row = {.flags = "--resume",
-                 .help = "go on from OUT/checkpoint.darb",
-                 .is_switch = true},
+        {.row = {.flags = "--resume", .help = "go on from OUT/checkpoint.darb", .is_switch = true},
          .place = [](Request& r) -> RequestPlace { return &r.resume; }});
     rows.push_back({.row = {.flags = "--allow-mixed",
                             .group = option_group::kDevice,

@@ -17,7 +17,7 @@ struct RunPreset {
 /// The quickest first; the last is what a run without a preset is.
 inline constexpr std::array<RunPreset, 3> kRunPresets{{
     {"preview", "minutes on most devices", 1'600, 400},
-    {"good", "a good scene", 7'000, 800},
+    {"good", "for most uses", 7'000, 800},
     {"full", "the length of 3DGS", 30'000, 1'600},
 }};
 
