@@ -79,9 +79,7 @@ void add_row(CLI::App& command, const RequestOption& option, GivenOptions& given
 // How the command shows its run, beside the rows that help has before them.
 void add_own_flags(CLI::App& command, const std::string& behind, TrainFlags& f) {
     if (behind == "--resume") {
-        command
-            .add_flag("--view", f.shown.view,
-                      "watch the run; closing the window lets it go on")
+        command.add_flag("--view", f.shown.view, "watch the run; closing the window lets it go on")
             ->group(option_group::kRun);
         add_quiet_flag(command, f.shown.quiet)->group(option_group::kRun);
     } else if (behind == "--allow-mixed") {
