@@ -223,25 +223,23 @@ TEST(Regularisers, fade_what_no_photo_shows) {
 TEST(GrowthTarget, follows_its_rule_to_the_limit) {
     TrainOptions options;
     options.strategy = Strategy::mcmc;
-    EXPECT_EQ(growth_target(options, Schedule(options), 600, 1000, 5000), 1050U);
-    EXPECT_EQ(growth_target(options, Schedule(options), 600, 1000, 1020), 1020U);
-    EXPECT_EQ(growth_target(options, Schedule(options), 600, 1000, 900), 1000U)
+    EXPECT_EQ(growth_target(Schedule(options), 600, 1000, 5000), 1050U);
+    EXPECT_EQ(growth_target(Schedule(options), 600, 1000, 1020), 1020U);
+    EXPECT_EQ(growth_target(Schedule(options), 600, 1000, 900), 1000U)
         << "never below what is there";
     EXPECT_EQ(Schedule(options).rounds.end, 25'000);
-    EXPECT_EQ(growth_target(options, Schedule(options), 24'800, 1000, 4000), 1050U)
+    EXPECT_EQ(growth_target(Schedule(options), 24'800, 1000, 4000), 1050U)
         << "nobody asked for a number";
     options.max_splats = 4000;
-    EXPECT_EQ(growth_target(options, Schedule(options), 24'800, 1000, 4000), 2000U)
-        << "two rounds are left";
-    EXPECT_EQ(growth_target(options, Schedule(options), 24'900, 1000, 4000), 4000U)
-        << "this is the last";
+    EXPECT_EQ(growth_target(Schedule(options), 24'800, 1000, 4000), 2000U) << "two rounds are left";
+    EXPECT_EQ(growth_target(Schedule(options), 24'900, 1000, 4000), 4000U) << "this is the last";
     options.strategy = Strategy::budget;
     const Schedule::Rounds rounds = Schedule(options).rounds;
     const int last = rounds.end - rounds.interval;
-    EXPECT_EQ(growth_target(options, Schedule(options), last, 1000, 5000), 5000U);
-    EXPECT_EQ(growth_target(options, Schedule(options), last - rounds.interval, 1000, 5000), 4000U)
+    EXPECT_EQ(growth_target(Schedule(options), last, 1000, 5000), 5000U);
+    EXPECT_EQ(growth_target(Schedule(options), last - rounds.interval, 1000, 5000), 4000U)
         << "a quarter of the gap is left for the last of two rounds";
-    EXPECT_EQ(growth_target(options, Schedule(options), 600, 7000, 5000), 5000U);
+    EXPECT_EQ(growth_target(Schedule(options), 600, 7000, 5000), 5000U);
 }
 
 TEST(GrowthTarget, the_forecast_knows_it) {

@@ -129,11 +129,10 @@ void compile_frames(Device& device) {
 }
 
 void compile_training(Device& device) {
-    TrainOptions options;
-    const Schedule schedule(options);
+    const Schedule schedule;
     for (const Strategy strategy : all_strategies())
-        strategy_row(strategy).make({device, options, schedule, 1.0});
-    const DensityControl control(device, options.kernel);
+        strategy_row(strategy).make({device, schedule, 1.0});
+    const DensityControl control(device, schedule.options.kernel);
     const MortonOrder order(device);
     const Exposure exposure(device, {2}, kSide * kSide), tones(device, {2, true}, kSide * kSide);
     const IterateAverage average(device);

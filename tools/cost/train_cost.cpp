@@ -39,8 +39,8 @@ struct TrainedRun {
 
 // What training does besides the accuracy settings that changes a gradient or a picture, each
 // reversed.
-std::vector<TrainCostRow> departures(const TrainOptions& options) {
-    const Schedule schedule(options);
+std::vector<TrainCostRow> departures(const Schedule& schedule) {
+    const TrainOptions& options = schedule.options;
     std::vector<TrainCostRow> rows;
     const auto add = [&](std::string name, std::function<void(TrainOptions&)> change) {
         rows.emplace_back();
@@ -49,12 +49,12 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
     };
     for (int degree = 0; degree <= options.sh_degree; ++degree)
         if (options.probe_sh || degree < options.sh_degree)
-            add(fmt::format("sh degree {} by the iteration", degree), [degree](TrainOptions& o) {
-                o.sh_degree = degree;
-                o.sh_interval =
-                    std::max(1, std::min(Schedule(o).degree_interval, o.iterations / 8));
-                o.probe_sh = false;
-            });
+            add(fmt::format("sh degree {} by the iteration", degree),
+                [degree, every = schedule.degree_interval](TrainOptions& o) {
+                    o.sh_degree = degree;
+                    o.sh_interval = std::max(1, std::min(every, o.iterations / 8));
+                    o.probe_sh = false;
+                });
     add(options.antialias ? "without antialias" : "with antialias",
         [](TrainOptions& o) { o.antialias = !o.antialias; });
     add(options.exposure ? "without exposure" : "with exposure",
@@ -65,7 +65,9 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
     if (options.sh_degree > 0)
         add(schedule.rest_every > 1 ? "harmonics step in every iteration"
                                     : "harmonics step in every 16th",
-            [](TrainOptions& o) { o.sh_rest_every = Schedule(o).rest_every > 1 ? 1 : 16; });
+            [every = schedule.rest_every > 1 ? 1 : 16](TrainOptions& o) {
+                o.sh_rest_every = every;
+            });
     if (options.random_background)
         add("one background", [](TrainOptions& o) { o.random_background = false; });
     if (options.opacity_weight > 0 || options.scale_weight > 0)
@@ -86,7 +88,8 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
 
 }  // namespace
 
-std::vector<TrainCostRow> training_rows(const Device& device, const TrainOptions& options) {
+std::vector<TrainCostRow> training_rows(const Device& device, const Schedule& schedule) {
+    const TrainOptions& options = schedule.options;
     std::vector<TrainCostRow> rows(1);
     for (int s = 0; s < kAccuracyCount; ++s) {
         if (s == kShDegree) continue;  // among the departures: it has its own schedule in training
@@ -108,7 +111,7 @@ std::vector<TrainCostRow> training_rows(const Device& device, const TrainOptions
         rows.push_back(row);
     }
     for (TrainCostRow& row : rows) row.name = accuracy_text(row.accuracy);
-    for (TrainCostRow& row : departures(options)) rows.push_back(std::move(row));
+    for (TrainCostRow& row : departures(schedule)) rows.push_back(std::move(row));
     return rows;
 }
 

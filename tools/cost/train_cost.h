@@ -13,7 +13,7 @@
 #include "engine/data/dataset.h"
 #include "engine/ranks/ranks.h"
 #include "tools/cost/accuracy_cost.h"
-#include "trainer/options/options.h"
+#include "trainer/options/schedule.h"
 
 namespace darb {
 
@@ -46,7 +46,7 @@ struct TrainCostResult {
 
 /// The rows for a run with these options, not measured yet: accuracy settings that the kernel has
 /// and that matter in training, presets, and departures from 3DGS.
-std::vector<TrainCostRow> training_rows(const Device& device, const TrainOptions& options);
+std::vector<TrainCostRow> training_rows(const Device& device, const Schedule& schedule);
 
 /// Trains every row with every seed, row after row within a seed, so that drift affects all rows
 /// alike. Throws Error where the data set has no held-out views.

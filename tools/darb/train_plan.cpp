@@ -166,9 +166,8 @@ void print_forecast(const Device& device, TrainJob& job, bool quiet) {
     job.pace = pace_of(f);
 }
 
-void print_growth(const TrainOptions& options) {
-    const Schedule schedule(options);
-    for (int i = 1; i < options.iterations; ++i)
+void print_growth(const Schedule& schedule) {
+    for (int i = 1; i < schedule.iterations; ++i)
         if (schedule.refines_after(i)) return;
     if (schedule.rounds.end > 0)
         say("growth: none, it would end after {} iterations and begin after {}: a longer "

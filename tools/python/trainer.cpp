@@ -108,18 +108,18 @@ void PyTrainer::make_trainer() {
     check_signals();
     photos_ = photos_of_run(job_.dataset, job_.options, std::move(job_.photos));
     check_signals();
+    const Schedule schedule(job_.options);
     std::optional<Checkpoint> start;
     if (!job_.resume_from.empty()) {
         start = read_checkpoint(job_.resume_from);
-        check_resumable(*start, job_.resume_from, job_.options, job_.dataset, fingerprint());
+        check_resumable(*start, job_.resume_from, schedule, job_.dataset, fingerprint());
         device.set_tuning(resumed_tuning(device.info(), device.tuning(), start->tuning,
                                          job_.resume_from.string()));
     } else {
-        check_start_memory(device, job_.dataset, job_.options);
+        check_start_memory(device, job_.dataset, schedule);
     }
-    trainer_ =
-        std::make_unique<Trainer>(device, job_.dataset, photos_,
-                                  first_model(job_.dataset, job_.options, start), job_.options);
+    trainer_ = std::make_unique<Trainer>(device, job_.dataset, photos_,
+                                         first_model(job_.dataset, schedule, start), schedule);
     trainer_->on_result = [this](const IterationResult& result) { latest_ = result; };
     trainer_->on_round = [this](int iteration, const DensityResult& result) {
         tell_round(iteration, result);
@@ -234,7 +234,7 @@ SplatModel PyTrainer::model() {
     const Training training(*device_);
     SplatModel model = trainer_->model();
     drop_non_finite(model);
-    drop_undrawn(Schedule(job_.options).undrawn_opacity, 0, model);  // as the command saves it
+    drop_undrawn(trainer_->schedule().undrawn_opacity, 0, model);  // as the command saves it
     return model;
 }
 

@@ -40,13 +40,12 @@ class Adc : public DensityStrategy {
     }
 };
 
-std::uint32_t no_target(const TrainOptions&, const Schedule&, int, std::uint32_t,
-                        std::uint32_t limit) {
+std::uint32_t no_target(const Schedule&, int, std::uint32_t, std::uint32_t limit) {
     return limit;
 }
 
-std::uint32_t end_by_photos(const TrainOptions& options, const GrowthStart& start) {
-    const Schedule::Rounds every = Schedule(options).rounds;
+std::uint32_t end_by_photos(const Schedule& schedule, const GrowthStart& start) {
+    const Schedule::Rounds every = schedule.rounds;
     const int first = every.begin / every.interval;
     const int last = std::max(every.end - 1, 0) / every.interval;
     const int rounds = std::max(0, last - first);
@@ -57,9 +56,9 @@ std::uint32_t end_by_photos(const TrainOptions& options, const GrowthStart& star
 }
 
 // The count grows evenly while density control runs.
-double even_mean(const TrainOptions& options, std::uint32_t start, std::uint32_t end) {
-    const double all = options.iterations;
-    const Schedule::Rounds rounds = Schedule(options).rounds;
+double even_mean(const Schedule& schedule, std::uint32_t start, std::uint32_t end) {
+    const double all = schedule.iterations;
+    const Schedule::Rounds rounds = schedule.rounds;
     const double to = std::clamp<double>(rounds.end, 0, all);
     const double from = std::clamp<double>(rounds.begin, 0, to);
     return (from * start + (to - from) * 0.5 * (double(start) + end) + (all - to) * end) / all;

@@ -10,8 +10,8 @@ namespace darb {
 namespace {
 
 // Reaches the limit with the last round; the gap closes as a parabola, fast at first.
-std::uint32_t close_the_gap(const TrainOptions&, const Schedule& schedule, int iteration,
-                            std::uint32_t count, std::uint32_t limit) {
+std::uint32_t close_the_gap(const Schedule& schedule, int iteration, std::uint32_t count,
+                            std::uint32_t limit) {
     if (count >= limit) return limit;
     const double rounds = rounds_left(schedule, iteration);
     const double stays = (rounds - 1) / rounds;
@@ -20,19 +20,17 @@ std::uint32_t close_the_gap(const TrainOptions&, const Schedule& schedule, int i
 
 class Budget : public DensityStrategy {
   public:
-    explicit Budget(const StrategySetup& setup)
-        : options_(setup.options), schedule_(setup.schedule) {}
+    explicit Budget(const StrategySetup& setup) : schedule_(setup.schedule) {}
 
     DensityResult round(const DensityRound& r) override {
         gpu::DensifyArgs args = r.args;
         args.gradient_threshold = FLT_MIN;
         const std::uint32_t target =
-            close_the_gap(options_, schedule_, r.iteration, r.splats.count(), r.limit);
+            close_the_gap(schedule_, r.iteration, r.splats.count(), r.limit);
         return r.control.run(r.splats, r.gradient_sum, args, target);
     }
 
   private:
-    TrainOptions options_;
     Schedule schedule_;
 };
 

@@ -46,7 +46,6 @@ class DensityStrategy {
 /// What a strategy is made with.
 struct StrategySetup {
     Device& device;
-    const TrainOptions& options;
     const Schedule& schedule;
     double extent;  // extent of the scene, world units
 };

@@ -115,7 +115,8 @@ std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options)
         start_points(dataset, options), options.max_splats.value_or(kAnyNumberOfSplats)));
 }
 
-SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
+SplatModel initial_model(const Dataset& dataset, const Schedule& schedule) {
+    const TrainOptions& options = schedule.options;
     PointCloud drawn;
     const bool random = starts_random(dataset, options);
     if (random) drawn = random_points(dataset, options);
@@ -132,7 +133,6 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     model.origin = choose_origin(points.position, kFarOff);
     model.resize(points.size());
     set_kernel(model, options.kernel);
-    const Schedule schedule(options);
     // A hair above: the default is what is pruned, too, and a point that no frame has shown stays.
     const double opacity = std::min(1.001 * schedule.initial_opacity, 0.999);
     const auto logit = static_cast<float>(std::log(opacity / (1 - opacity)));

@@ -12,7 +12,7 @@
 #include "engine/gpu/device.h"
 #include "engine/scene/splat_model.h"
 #include "engine/stereo/surface_points.h"
-#include "trainer/options/options.h"
+#include "trainer/options/schedule.h"
 
 namespace darb {
 
@@ -25,7 +25,7 @@ namespace darb {
 ///
 /// Points with a spacing lie on surfaces: their splats are flat along the normal and as wide as the
 /// points are apart.
-SplatModel initial_model(const Dataset& dataset, const TrainOptions& options);
+SplatModel initial_model(const Dataset& dataset, const Schedule& schedule);
 /// Whether it starts from random points: there are none, or options.start says so.
 bool starts_random(const Dataset& dataset, const TrainOptions& options);
 /// The points that its splats come from: the data set's, those of a dense start, or as many as are

@@ -21,11 +21,12 @@ constexpr double kGrowthARound = 1.05;  // and more where that misses the limit
 constexpr double kNoiseExtent = 5;
 
 // Never below count.
-std::uint32_t grow_by_share(const TrainOptions& options, const Schedule& schedule, int iteration,
-                            std::uint32_t count, std::uint32_t limit) {
+std::uint32_t grow_by_share(const Schedule& schedule, int iteration, std::uint32_t count,
+                            std::uint32_t limit) {
     const double rounds = rounds_left(schedule, iteration);
     const double needed = std::pow(double(limit) / std::max(count, 1U), 1 / rounds);
-    const double growth = options.max_splats ? std::max(kGrowthARound, needed) : kGrowthARound;
+    const double growth =
+        schedule.options.max_splats ? std::max(kGrowthARound, needed) : kGrowthARound;
     const double grown = std::ceil(growth * count);
     return std::max(count, static_cast<std::uint32_t>(std::min<double>(grown, limit)));
 }
@@ -33,31 +34,28 @@ std::uint32_t grow_by_share(const TrainOptions& options, const Schedule& schedul
 class Mcmc : public DensityStrategy {
   public:
     explicit Mcmc(const StrategySetup& setup)
-        : options_(setup.options),
-          schedule_(setup.schedule),
+        : schedule_(setup.schedule),
           extent_(setup.extent),
-          relocation_(setup.device, options_.kernel, options_.footprint) {}
+          relocation_(setup.device, schedule_.options.kernel, schedule_.options.footprint) {}
 
     void record_after_update(const StepFrame& f) override {
-        const double rate = options_.noise_lr * schedule_.position_rate(f.iteration) *
+        const double rate = schedule_.options.noise_lr * schedule_.position_rate(f.iteration) *
                             kNoiseExtent * kNoiseExtent / extent_ *
                             std::sqrt(static_cast<double>(schedule_.batch));
         const auto stream = 0x6E6F697Eull << 32 | static_cast<std::uint32_t>(f.iteration);
-        Pcg32 random(options_.seed, stream);
+        Pcg32 random(schedule_.options.seed, stream);
         relocation_.record_noise(f.commands, f.splats, f.status, static_cast<float>(rate),
                                  schedule_.prune_opacity, random.next());
     }
 
     DensityResult round(const DensityRound& r) override {
         const std::uint32_t count = r.splats.count();
-        const std::uint32_t target =
-            grow_by_share(options_, schedule_, r.iteration, count, r.limit);
+        const std::uint32_t target = grow_by_share(schedule_, r.iteration, count, r.limit);
         return relocation_.run(r.splats, r.control, r.args.prune_opacity, target - count,
                                r.args.seed);
     }
 
   private:
-    TrainOptions options_;
     Schedule schedule_;
     double extent_;
     Relocation relocation_;

@@ -16,17 +16,17 @@ constexpr std::uint32_t kMinIntersectionsPerSplat = 4;
 
 }  // namespace
 
-std::uint32_t predict_splats(const TrainOptions& options, const GrowthStart& start) {
-    return strategy_row(options.strategy).forecast_end(options, start);
+std::uint32_t predict_splats(const Schedule& schedule, const GrowthStart& start) {
+    return strategy_row(schedule.options.strategy).forecast_end(schedule, start);
 }
 
-std::uint32_t wanted_splats(const Device& device, const Dataset& dataset,
-                            const TrainOptions& options, std::uint64_t photo_pixels,
-                            std::uint32_t start) {
+std::uint32_t wanted_splats(const Device& device, const Dataset& dataset, const Schedule& schedule,
+                            std::uint64_t photo_pixels, std::uint32_t start) {
+    const TrainOptions& options = schedule.options;
     const std::uint32_t limit = std::min(options.max_splats.value_or(kAnyNumberOfSplats),
                                          GpuSplats::max_count(device, options.sh_degree, true));
-    return predict_splats(options, {start, photo_pixels, dataset.detail, limit,
-                                    starts_random(dataset, options), dataset.start.size() > 0});
+    return predict_splats(schedule, {start, photo_pixels, dataset.detail, limit,
+                                     starts_random(dataset, options), dataset.start.size() > 0});
 }
 
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
@@ -42,14 +42,14 @@ std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options
                 options.max_splats.value_or(kAnyNumberOfSplats), starts_random(dataset, usual)});
 }
 
-double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
-    return strategy_row(options.strategy).forecast_mean(options, start, end);
+double mean_splats(std::uint32_t start, std::uint32_t end, const Schedule& schedule) {
+    return strategy_row(schedule.options.strategy).forecast_mean(schedule, start, end);
 }
 
-int predict_degree(const TrainOptions& options, int iterations) {
+int predict_degree(const Schedule& schedule, int iterations) {
+    const TrainOptions& options = schedule.options;
     if (!options.probe_sh) return options.sh_degree;
-    return std::min(options.sh_degree,
-                    std::max(iterations - 1, 0) / Schedule(options).degree_interval);
+    return std::min(options.sh_degree, std::max(iterations - 1, 0) / schedule.degree_interval);
 }
 
 bool has_rounds(const Schedule& schedule) {

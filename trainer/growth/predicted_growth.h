@@ -7,31 +7,28 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "trainer/options/options.h"
 #include "trainer/options/schedule.h"
-#include "trainer/options/strategy.h"
 
 namespace darb {
 
 /// Splats at the end: by the strategy's rule of thumb.
-std::uint32_t predict_splats(const TrainOptions& options, const GrowthStart& start);
+std::uint32_t predict_splats(const Schedule& schedule, const GrowthStart& start);
 
 /// The same for a data set on a device, whatever its memory says: within options.max_splats and
 /// what the device's buffers hold. photo_pixels: of all training photos together.
-std::uint32_t wanted_splats(const Device& device, const Dataset& dataset,
-                            const TrainOptions& options, std::uint64_t photo_pixels,
-                            std::uint32_t start);
+std::uint32_t wanted_splats(const Device& device, const Dataset& dataset, const Schedule& schedule,
+                            std::uint64_t photo_pixels, std::uint32_t start);
 
 /// The count that a strategy grows to where no --max-splats is given: what adc would be forecast to
 /// end with from its points, or from random ones where there are none.
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options);
 
 /// Mean count over the run; adc: where it grows evenly while density control runs.
-double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options);
+double mean_splats(std::uint32_t start, std::uint32_t end, const Schedule& schedule);
 
 /// The degree of colour that a run has after so many iterations, where options.probe_sh does not
 /// refuse the first.
-int predict_degree(const TrainOptions& options, int iterations);
+int predict_degree(const Schedule& schedule, int iterations);
 
 /// Whether density control runs at all.
 bool has_rounds(const Schedule& schedule);

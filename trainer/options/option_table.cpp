@@ -262,8 +262,8 @@ void use_3dgs_schedule(TrainOptions& options) {
     }
 }
 
-Json settings_json(const TrainOptions& options) {
-    const Schedule schedule(options);
+Json settings_json(const Schedule& schedule) {
+    const TrainOptions& options = schedule.options;
     Json settings = Json::object();
     for (const OptionRow& row : option_rows()) {
         if (*row.setting == '\0' || (row.stands && !row.stands(options, schedule))) continue;

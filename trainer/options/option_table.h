@@ -87,6 +87,6 @@ nlohmann::json member_json(const OptionRow& row, const TrainOptions& options);
 void set_member(const OptionRow& row, const nlohmann::json& value, TrainOptions& options);
 
 /// Every option that changes the result, resolved, as one JSON object.
-nlohmann::json settings_json(const TrainOptions& options);
+nlohmann::json settings_json(const Schedule& schedule);
 
 }  // namespace darb

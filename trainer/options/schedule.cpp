@@ -75,16 +75,12 @@ Schedule::Resets resets_of(const TrainOptions& o, float prune_opacity,
 }  // namespace
 
 Schedule::Schedule(const TrainOptions& o)
-    : iterations(o.iterations),
+    : options(o),
+      iterations(o.iterations),
       last(o.iterations),
       batch(o.batch),
       strategy(o.strategy),
-      speedup(speedup_of(o)),
-      prune_extent_(o.prune_extent),
-      exposure_lr_init_(o.exposure_lr_init),
-      exposure_lr_final_(o.exposure_lr_final),
-      sh_degree_(o.sh_degree),
-      ramp_(o.resolution_ramp) {
+      speedup(speedup_of(o)) {
     if (batch < 1 || (batch & (batch - 1)) != 0)
         throw Error(fmt::format("--batch {}", batch), "is no power of two",
                     "Give 1, 2, 4, 8 and so on: gradients are added in pairs.");
@@ -152,11 +148,12 @@ Schedule::Rates Schedule::rates(int iteration) const {
 
 double Schedule::exposure_rate(int iteration) const {
     const double t = std::clamp(double(iteration) / iterations, 0.0, 1.0);
-    return exposure_lr_init_ * std::pow(exposure_lr_final_ / exposure_lr_init_, t);
+    const float from = options.exposure_lr_init;
+    return from * std::pow(options.exposure_lr_final / from, t);
 }
 
 int Schedule::sh_degree(int iteration) const {
-    return std::min(sh_degree_, iteration / degree_interval);
+    return std::min(options.sh_degree, iteration / degree_interval);
 }
 
 bool Schedule::refines_after(int iteration) const {
@@ -170,7 +167,7 @@ bool Schedule::resets_after(int iteration) const {
 }
 
 bool Schedule::prunes_by_size(int iteration) const {
-    return prune_extent_ > 0 && iteration > resets.interval;
+    return options.prune_extent > 0 && iteration > resets.interval;
 }
 
 bool Schedule::regularises_unseen(std::size_t photos, int iteration) const {
@@ -207,7 +204,7 @@ int Schedule::last_change() const {
 
 std::vector<RampStep> Schedule::ramp_steps(int longest_side) const {
     std::vector<RampStep> steps;
-    if (!ramp_) return steps;
+    if (!options.resolution_ramp) return steps;
     int before = 0;
     for (const RampSize& size : kRampSizes) {
         const int until = static_cast<int>(size.until * iterations);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Schedule: what a training run does at which iteration. It is resolved once from TrainOptions,
-// where what is absent takes its default by the length of the run, the kernel and the strategy;
-// from then on it only answers. It knows no scene: lengths are in scene extents, photos come as
-// arguments.
+// Schedule: what a training run does at which iteration. A run resolves it once from its
+// TrainOptions, which it keeps: what is absent there takes its default by the length of the run,
+// the kernel and the strategy. From then on it only answers. It knows no scene: lengths are in
+// scene extents, photos come as arguments.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,9 @@ struct RampStep {
 
 class Schedule {
   public:
-    explicit Schedule(const TrainOptions& options);
+    /// Implicit, because a schedule is what options mean. Throws Error where they contradict
+    /// themselves.
+    Schedule(const TrainOptions& of = {});
 
     /// Learning rates of Adam. position is in scene extents.
     struct Rates {
@@ -78,6 +80,7 @@ class Schedule {
     /// The last iteration of the step after this one: steps begin at multiples of the batch.
     int step_end(int iteration) const;
 
+    TrainOptions options;  // as they were given
     int iterations;
     int last = 0;  // the run ends with it: `iterations`, or sooner after end_early()
     int batch = 1;
@@ -109,11 +112,6 @@ class Schedule {
     int average_begin = 0;
     double length_scale = 1;  // multiplies every length that options have for a Gaussian
     float largest_scale = 0;  // of a splat, over scene_reach() and length_scale; 0: no limit
-
-  private:
-    float prune_extent_, exposure_lr_init_, exposure_lr_final_;
-    int sh_degree_;
-    bool ramp_;
 };
 
 }  // namespace darb

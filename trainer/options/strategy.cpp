@@ -50,9 +50,9 @@ std::string strategy_names() {
     return names;
 }
 
-std::uint32_t growth_target(const TrainOptions& options, const Schedule& schedule, int iteration,
-                            std::uint32_t count, std::uint32_t limit) {
-    return strategy_row(options.strategy).target(options, schedule, iteration, count, limit);
+std::uint32_t growth_target(const Schedule& schedule, int iteration, std::uint32_t count,
+                            std::uint32_t limit) {
+    return strategy_row(schedule.options.strategy).target(schedule, iteration, count, limit);
 }
 
 int rounds_left(const Schedule& schedule, int iteration) {
@@ -61,8 +61,8 @@ int rounds_left(const Schedule& schedule, int iteration) {
     return std::max(1, (last - iteration) / interval + 1);
 }
 
-Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::uint32_t limit) {
-    const Schedule schedule(options);
+Growth simulate_growth(const Schedule& schedule, std::uint32_t start, std::uint32_t limit) {
+    const TrainOptions& options = schedule.options;
     double count = start, sum = 0;
     int since = 0;
     const int interval = schedule.rounds.interval;
@@ -70,17 +70,15 @@ Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::ui
         if (!schedule.refines_after(i)) continue;
         sum += count * (i - since);
         since = i;
-        const auto target =
-            growth_target(options, schedule, i, static_cast<std::uint32_t>(count), limit);
+        const auto target = growth_target(schedule, i, static_cast<std::uint32_t>(count), limit);
         if (count < limit) count = std::min<double>(2 * count, target);
     }
     sum += count * (options.iterations - since);
     return {static_cast<std::uint32_t>(count), sum / std::max(options.iterations, 1)};
 }
 
-std::vector<double> growth_path(const TrainOptions& options, std::uint32_t start,
-                                std::uint32_t end) {
-    const Schedule schedule(options);
+std::vector<double> growth_path(const Schedule& schedule, std::uint32_t start, std::uint32_t end) {
+    const TrainOptions& options = schedule.options;
     const StrategyRow& row = strategy_row(options.strategy);
     std::vector<double> path;
     double count = start;
@@ -88,8 +86,7 @@ std::vector<double> growth_path(const TrainOptions& options, std::uint32_t start
         if (!row.grows_to_limit) {
             count = double(row.forecast_until(schedule, i, start, end));
         } else if (schedule.refines_after(i) && count < end) {
-            const auto target =
-                row.target(options, schedule, i, static_cast<std::uint32_t>(count), end);
+            const auto target = row.target(schedule, i, static_cast<std::uint32_t>(count), end);
             count = std::min<double>(2 * count, target);
         }
         path.push_back(count);
@@ -97,12 +94,12 @@ std::vector<double> growth_path(const TrainOptions& options, std::uint32_t start
     return path;
 }
 
-std::uint32_t simulated_end(const TrainOptions& options, const GrowthStart& start) {
-    return std::max(start.splats, simulate_growth(options, start.splats, start.limit).end);
+std::uint32_t simulated_end(const Schedule& schedule, const GrowthStart& start) {
+    return std::max(start.splats, simulate_growth(schedule, start.splats, start.limit).end);
 }
 
-double simulated_mean(const TrainOptions& options, std::uint32_t start, std::uint32_t end) {
-    return simulate_growth(options, start, end).mean;
+double simulated_mean(const Schedule& schedule, std::uint32_t start, std::uint32_t end) {
+    return simulate_growth(schedule, start, end).mean;
 }
 
 std::uint64_t end_at_once(const Schedule&, int, double, std::uint32_t end) {

@@ -53,8 +53,8 @@ struct GrowthStart {
 void use_3dgs_schedule(TrainOptions& options);
 
 /// StrategyRow::target of the options' strategy.
-std::uint32_t growth_target(const TrainOptions& options, const Schedule& schedule, int iteration,
-                            std::uint32_t count, std::uint32_t limit);
+std::uint32_t growth_target(const Schedule& schedule, int iteration, std::uint32_t count,
+                            std::uint32_t limit);
 
 /// Splats that a row's target makes of `start`, for forecasts: at most twice as many in a round.
 /// mean: the mean count over the run.
@@ -62,16 +62,15 @@ struct Growth {
     std::uint32_t end = 0;
     double mean = 0;
 };
-Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::uint32_t limit);
+Growth simulate_growth(const Schedule& schedule, std::uint32_t start, std::uint32_t limit);
 
 /// [iteration, 0 to options.iterations] splats on the way from the start to the end that is
 /// forecast.
-std::vector<double> growth_path(const TrainOptions& options, std::uint32_t start,
-                                std::uint32_t end);
+std::vector<double> growth_path(const Schedule& schedule, std::uint32_t start, std::uint32_t end);
 
 // Forecasts of strategies that have a target.
-std::uint32_t simulated_end(const TrainOptions& options, const GrowthStart& start);
-double simulated_mean(const TrainOptions& options, std::uint32_t start, std::uint32_t end);
+std::uint32_t simulated_end(const Schedule& schedule, const GrowthStart& start);
+double simulated_mean(const Schedule& schedule, std::uint32_t start, std::uint32_t end);
 std::uint64_t end_at_once(const Schedule& schedule, int iteration, double start, std::uint32_t end);
 /// Rounds of density control from this one to the last, both counted; at least 1.
 int rounds_left(const Schedule& schedule, int iteration);
@@ -100,12 +99,12 @@ struct StrategyRow {
 
     /// Splats after the round of this iteration, for `count` before it and at most `limit` in the
     /// end; the limit where it has no target.
-    std::uint32_t (*target)(const TrainOptions& options, const Schedule& schedule, int iteration,
-                            std::uint32_t count, std::uint32_t limit);
+    std::uint32_t (*target)(const Schedule& schedule, int iteration, std::uint32_t count,
+                            std::uint32_t limit);
     // Forecasts: splats at the end; the mean count over the run; the most up to an iteration.
-    std::uint32_t (*forecast_end)(const TrainOptions& options,
+    std::uint32_t (*forecast_end)(const Schedule& schedule,
                                   const GrowthStart& start) = simulated_end;
-    double (*forecast_mean)(const TrainOptions& options, std::uint32_t start,
+    double (*forecast_mean)(const Schedule& schedule, std::uint32_t start,
                             std::uint32_t end) = simulated_mean;
     std::uint64_t (*forecast_until)(const Schedule& schedule, int iteration, double start,
                                     std::uint32_t end) = end_at_once;

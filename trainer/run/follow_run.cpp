@@ -29,20 +29,20 @@ std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run) {
     return checkpoint;
 }
 
-SplatModel first_model(const Dataset& dataset, const TrainOptions& options,
+SplatModel first_model(const Dataset& dataset, const Schedule& schedule,
                        const std::optional<Checkpoint>& checkpoint, const SplatModel* given) {
-    SplatModel model = given ? *given : initial_model(dataset, options);
+    SplatModel model = given ? *given : initial_model(dataset, schedule);
     if (checkpoint) model.origin = checkpoint->state.model.origin;
     return model;
 }
 
-void check_ranks(const Device& device, const TrainOptions& options, const RankGroup& ranks,
+void check_ranks(const Device& device, const Schedule& schedule, const RankGroup& ranks,
                  const std::string& fingerprint) {
     if (!ranks.several()) return;
     RankFacts facts = ranks.mixed ? rank_facts() : rank_facts(device);
     facts.insert(facts.begin(), {"option --allow-mixed", ranks.mixed ? "on" : "off"});
     facts.emplace_back("data set", fingerprint);
-    facts.emplace_back("settings", settings_text(options));
+    facts.emplace_back("settings", settings_text(schedule));
     check_same(*ranks.all, facts);
 }
 
@@ -64,29 +64,29 @@ std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& o
     return photos;
 }
 
-TrainResult follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+TrainResult follow_training(Device& device, const Dataset& dataset, const Schedule& schedule,
                             const RunOptions& run, const std::atomic<bool>* stop,
                             std::vector<ImageU8> photos) {
-    check_gain_watch(dataset, options, run.ranks);
-    photos = photos_of_run(dataset, options, std::move(photos));
+    check_gain_watch(dataset, schedule.options, run.ranks);
+    photos = photos_of_run(dataset, schedule.options, std::move(photos));
     photo_doubts(dataset, photos);  // throws; the first rank says them
     const std::string fingerprint = dataset_fingerprint(dataset, photos);
     const std::optional<Checkpoint> checkpoint = checkpoint_of(device, run);
-    Trainer trainer(device, dataset, photos, first_model(dataset, options, checkpoint), options,
+    Trainer trainer(device, dataset, photos, first_model(dataset, schedule, checkpoint), schedule,
                     run.ranks);
     photos = {};  // they are where steps read them
     give_back_freed_memory();
-    check_ranks(device, options, run.ranks, fingerprint);
+    check_ranks(device, schedule, run.ranks, fingerprint);
     if (checkpoint) {
-        check_resumable(*checkpoint, run.resume_from, options, dataset, fingerprint);
+        check_resumable(*checkpoint, run.resume_from, schedule, dataset, fingerprint);
         trainer.restore(checkpoint->state);
     }
-    while (trainer.iteration() < options.iterations &&
+    while (trainer.iteration() < schedule.iterations &&
            !is_to_stop(trainer, run.ranks, stop && stop->load()))
         while_doing(fmt::format("iteration {}", trainer.iteration() + 1), [&] { trainer.step(); });
     TrainResult summary;
     summary.iteration = trainer.iteration();
-    summary.interrupted = trainer.iteration() < options.iterations;
+    summary.interrupted = trainer.iteration() < schedule.iterations;
     return summary;
 }
 

@@ -20,19 +20,19 @@ std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run);
 
 /// What a Trainer is made with: the start, with the origin of the checkpoint that it will restore,
 /// as photos are seen from there. given: what it starts from in place of initial_model().
-SplatModel first_model(const Dataset& dataset, const TrainOptions& options,
+SplatModel first_model(const Dataset& dataset, const Schedule& schedule,
                        const std::optional<Checkpoint>& checkpoint,
                        const SplatModel* given = nullptr);
 
 /// Throws Error where ranks train other things, or on devices that may round differently.
-void check_ranks(const Device& device, const TrainOptions& options, const RankGroup& ranks,
+void check_ranks(const Device& device, const Schedule& schedule, const RankGroup& ranks,
                  const std::string& fingerprint);
 
 /// Before a step, on all ranks: whether any is to stop. Now and then also that they are equal.
 bool is_to_stop(Trainer& trainer, const RankGroup& ranks, bool stop);
 
 /// run_training() of another rank than the first.
-TrainResult follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+TrainResult follow_training(Device& device, const Dataset& dataset, const Schedule& schedule,
                             const RunOptions& run, const std::atomic<bool>* stop,
                             std::vector<ImageU8> photos);
 

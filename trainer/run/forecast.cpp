@@ -99,7 +99,7 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     placeholder.origin = model.origin;
     Trainer trainer(device, few, grey_photos(few.views), placeholder, options);
     Trainer::State state;
-    const Schedule schedule(options);
+    const Schedule& schedule = trainer.schedule();
     state.iteration = options.sh_degree * schedule.degree_interval;
     if (const int every = schedule.rest_every; every > 1)  // both ways of a step run at first
         state.iteration += every - 1 - state.iteration % every;
@@ -143,13 +143,12 @@ void fit_size(const Device& device, const TrainOptions& options, std::uint32_t w
 // The ramp's smaller photos, at the count at the start: the more it grows while they last, the more
 // they save beyond that. Where most of the start goes they save the same share of what is left.
 void measure_ramp(Device& device, const Dataset& few, const SplatModel& start,
-                  const TrainOptions& options, Forecast& f) {
-    const Schedule schedule(options);
-    int at_start = f.falls ? first_round(schedule) : options.iterations;
+                  const Schedule& schedule, Forecast& f) {
+    int at_start = f.falls ? first_round(schedule) : schedule.iterations;
     for (const RampStep& step : schedule.ramp_steps(std::max(f.demand.width, f.demand.height))) {
         Dataset smaller = few;
         for (View& view : smaller.views) view.camera = divided(view.camera, step.divisor);
-        const Measurement measured = measure_training(device, smaller, start, options);
+        const Measurement measured = measure_training(device, smaller, start, schedule.options);
         f.ramp_ms.push_back(measured.ms);
         if (at_start > 0) f.start_intersections = intersections_per_splat(measured, start);
         const int before = std::clamp(at_start, 0, step.iterations);
@@ -175,20 +174,21 @@ SplatModel surface_model(const Dataset& dataset, TrainOptions options, const Spl
 }
 
 // How much of the run is as slow as its end, the rest as its start; in the mean.
-double share_of_the_end(const TrainOptions& options, const Forecast& f) {
+double share_of_the_end(const Schedule& schedule, const Forecast& f) {
     if (f.falls) {
-        const double before = first_round(Schedule(options));
-        return 1 - std::clamp(before / options.iterations, 0.0, 1.0);
+        const double before = first_round(schedule);
+        return 1 - std::clamp(before / schedule.iterations, 0.0, 1.0);
     }
     if (f.splats == f.start_splats) return 0;
-    return (mean_splats(f.start_splats, f.splats, options) - f.start_splats) /
+    return (mean_splats(f.start_splats, f.splats, schedule) - f.start_splats) /
            (double(f.splats) - f.start_splats);
 }
 
 // Times and intersections of the forecast, from the count at the start and one near that at the
 // end.
 void measure_both(Device& device, const Dataset& dataset, const SplatModel& start,
-                  const TrainOptions& options, Forecast& f) {
+                  const Schedule& schedule, Forecast& f) {
+    const TrainOptions& options = schedule.options;
     const Dataset few = some_views(dataset);
     const Measurement at_start = measure_training(device, few, start, options);
     f.start_ms = f.end_ms = at_start.ms;
@@ -208,9 +208,9 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
                                          : (ms - at_start.ms) / (measured - f.start_splats);
         f.end_ms = ms + per_splat * (f.splats - measured);
     }
-    const double share = share_of_the_end(options, f);
+    const double share = share_of_the_end(schedule, f);
     f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3;
-    measure_ramp(device, few, start, options, f);
+    measure_ramp(device, few, start, schedule, f);
 }
 
 // The iterations with smaller photos.
@@ -233,9 +233,9 @@ std::uint64_t splats_with_smaller_photos(const Schedule& schedule, const Forecas
 // The most of what the end takes; of the last rounds of density control and drops of splats, with
 // the colour that there is by then; and of the first iterations, with smaller photos or before most
 // of a random start goes. photos: as add_photos counts them, the ramp's smaller ones among them.
-void find_peak(const Device& device, const TrainOptions& options, const MemoryDemand& photos,
+void find_peak(const Device& device, const Schedule& schedule, const MemoryDemand& photos,
                Forecast& f) {
-    const Schedule schedule(options);
+    const TrainOptions& options = schedule.options;
     f.peak = f.demand;
     f.peak.densifies = false;
     const auto take_larger = [&](const MemoryDemand& demand) {
@@ -244,14 +244,14 @@ void find_peak(const Device& device, const TrainOptions& options, const MemoryDe
     };
     MemoryDemand rounds = f.demand;
     rounds.averages = false;
-    rounds.sh_degree = predict_degree(options, schedule.last_change());
+    rounds.sh_degree = predict_degree(schedule, schedule.last_change());
     if (rounds.densifies) take_larger(rounds);
     if (photos.small_cameras == 0 && !f.falls) return;
     MemoryDemand early = rounds;
     early.small_pixels = photos.small_pixels;
     early.small_cameras = photos.small_cameras;
     early.sh_degree =
-        predict_degree(options, f.falls ? first_round(schedule) + 1 : ramp_end(schedule, f));
+        predict_degree(schedule, f.falls ? first_round(schedule) + 1 : ramp_end(schedule, f));
     early.splats = splats_with_smaller_photos(schedule, f);
     const double room =
         f.falls ? intersection_room(f.start_intersections)
@@ -295,23 +295,23 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
     return model;
 }
 
-Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainOptions& options,
+Forecast forecast_training(Device& scratch, const Dataset& dataset, const Schedule& schedule,
                            bool measure) {
-    SplatModel start = initial_model(dataset, options);
-    const Schedule schedule(options);
+    const TrainOptions& options = schedule.options;
+    SplatModel start = initial_model(dataset, schedule);
     Forecast f;
-    add_photos(dataset.views, options, f.demand);
+    add_photos(dataset.views, schedule, f.demand);
     const MemoryDemand photos = f.demand;
     f.demand.small_pixels = f.demand.small_cameras = 0;  // none at the end
-    f.demand.sh_degree = predict_degree(options, options.iterations);
+    f.demand.sh_degree = predict_degree(schedule, options.iterations);
     start.sh_degree = f.demand.sh_degree;  // of the times
     if (options.probe_sh)
         start.sh_degree =
             std::min(start.sh_degree, options.iterations / 2 / schedule.degree_interval);
     start.sh_rest.assign(start.size() * static_cast<size_t>(start.rest_count()), 0.0f);
     f.start_splats = static_cast<std::uint32_t>(start.size());
-    f.demand.streams = photos_stream(scratch, dataset, options, photos, f.start_splats);
-    f.splats = wanted_splats(scratch, dataset, options, photos.photo_pixels, f.start_splats);
+    f.demand.streams = photos_stream(scratch, dataset, schedule, photos, f.start_splats);
+    f.splats = wanted_splats(scratch, dataset, schedule, photos.photo_pixels, f.start_splats);
     f.demand.densifies = has_rounds(schedule);
     f.falls = starts_random(dataset, options) && has_rounds(schedule) &&
               strategy_row(options.strategy).prunes_random_start;
@@ -322,10 +322,10 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
             const ScopeGuard restore([&, before = as_run] { scratch.set_tuning(before); });
             if (f.demand.streams) as_run.photos = PhotoPlace::streamed;  // as those of the run
             scratch.set_tuning(as_run);
-            measure_both(scratch, dataset, start, options, f);
+            measure_both(scratch, dataset, start, schedule, f);
         } catch (const NoRoom&) {  // the run will say so itself, if it has none
         }
-    find_peak(scratch, options, photos, f);
+    find_peak(scratch, schedule, photos, f);
     return f;
 }
 
@@ -347,15 +347,15 @@ std::uint64_t address_space() {
     return std::numeric_limits<std::uint64_t>::max();
 }
 
-MemoryDemand demand_at_start(const Device& device, const Dataset& dataset,
-                             const TrainOptions& options, std::uint32_t splats) {
+MemoryDemand demand_at_start(const Device& device, const Dataset& dataset, const Schedule& schedule,
+                             std::uint32_t splats) {
     MemoryDemand demand;
-    add_photos(dataset.views, options, demand);
-    demand.streams = photos_stream(device, dataset, options, demand, splats);
+    add_photos(dataset.views, schedule, demand);
+    demand.streams = photos_stream(device, dataset, schedule, demand, splats);
     demand.splats = splats;
     demand.intersections = splats;  // at least, where a photo sees them
     demand.densifies = false;
-    if (options.probe_sh) demand.sh_degree = 0;
+    if (schedule.options.probe_sh) demand.sh_degree = 0;
     return demand;
 }
 
@@ -371,12 +371,13 @@ std::uint64_t free_host_bytes() {
     return bytes;
 }
 
-void check_start_memory(const Device& device, const Dataset& dataset, const TrainOptions& options,
+void check_start_memory(const Device& device, const Dataset& dataset, const Schedule& schedule,
                         std::uint64_t host_bytes) {
+    const TrainOptions& options = schedule.options;
     const bool random = starts_random(dataset, options);
     const std::uint64_t points = random ? start_points(dataset, options) : 0;  // others are there
     const std::uint32_t splats = initial_count(dataset, options);
-    const MemoryDemand demand = demand_at_start(device, dataset, options, splats);
+    const MemoryDemand demand = demand_at_start(device, dataset, schedule, splats);
     const MemoryPlan plan = plan_memory(device, demand);
     const std::uint64_t device_bytes = plan.total();
     const bool shared = device.info().unified_memory;

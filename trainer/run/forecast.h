@@ -9,8 +9,7 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "engine/scene/splat_model.h"
-#include "trainer/options/options.h"
-#include "trainer/options/strategy.h"
+#include "trainer/options/schedule.h"
 #include "trainer/step/memory_plan.h"
 
 namespace darb {
@@ -40,7 +39,7 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
 /// seconds in all; time is a + b * splats through both. measure = false, and where the device has
 /// no room for that: splats and memory, and what was measured until then. scratch: a device of its
 /// own, so that the run's peak_bytes stay the run's.
-Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainOptions& options,
+Forecast forecast_training(Device& scratch, const Dataset& dataset, const Schedule& schedule,
                            bool measure = true);
 
 // Whether a run can begin at all: before anything is made for its first splats.
@@ -52,7 +51,7 @@ std::uint64_t free_host_bytes();
 /// Throws Error, with the number that fits, where the splats that a run begins with do not fit into
 /// the device or the points that they come from not into `host_bytes`. What is counted is less than
 /// what a run takes: it refuses only what cannot be.
-void check_start_memory(const Device& device, const Dataset& dataset, const TrainOptions& options,
+void check_start_memory(const Device& device, const Dataset& dataset, const Schedule& schedule,
                         std::uint64_t host_bytes = free_host_bytes());
 
 }  // namespace darb

@@ -35,8 +35,8 @@ Progress::Progress(int first_iteration, int last_iteration, bool quiet)
       last_print_(start_),
       begin_(start_) {}
 
-void Progress::expect(const TrainOptions& options, const PaceForecast& pace) {
-    left_.emplace(options, pace);
+void Progress::expect(const Schedule& schedule, const PaceForecast& pace) {
+    left_.emplace(schedule, pace);
 }
 
 void Progress::update(const IterationResult& r, const Device& device) {

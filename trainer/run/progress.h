@@ -17,7 +17,7 @@ class Progress {
     Progress(int first_iteration, int last_iteration, bool quiet);
 
     /// How the pace will change; without, what is left is told by the pace so far.
-    void expect(const TrainOptions& options, const PaceForecast& pace);
+    void expect(const Schedule& schedule, const PaceForecast& pace);
     /// After every finished iteration; decides itself when to print.
     void update(const IterationResult& result, const Device& device);
     /// A line of its own (evaluation, saved file), leaving the bar intact.

@@ -60,13 +60,14 @@ std::vector<ImageU8> with_doubts(const Dataset& dataset, std::vector<ImageU8> ph
 // One run: the loop and what it writes. The stopwatch counts training alone.
 class Run {
   public:
-    Run(Device& device, const Dataset& dataset, const TrainOptions& options, const RunOptions& run,
+    Run(Device& device, const Dataset& dataset, const Schedule& schedule, const RunOptions& run,
         std::vector<ImageU8> photos)
         : device_(device),
           dataset_(dataset),
-          options_(options),
+          schedule_(schedule),
           run_(run),
-          photos_(with_doubts(dataset, photos_of_run(dataset, options, std::move(photos)))),
+          photos_(
+              with_doubts(dataset, photos_of_run(dataset, schedule.options, std::move(photos)))),
           fingerprint_(dataset_fingerprint(dataset, photos_)),
           rates_(rates_of(device)),
           tuning_(result_tuning(device)),
@@ -75,12 +76,12 @@ class Run {
                                [&] {
                                    return Trainer(
                                        device, dataset, photos_,
-                                       first_model(dataset, options, checkpoint_, run.start),
-                                       options, run.ranks, run.frozen);
+                                       first_model(dataset, schedule, checkpoint_, run.start),
+                                       schedule, run.ranks, run.frozen);
                                })),
-          watch_(options, Schedule(options)),
+          watch_(schedule),
           log_(run.output),
-          progress_(1, options.iterations, run.quiet) {
+          progress_(1, schedule.iterations, run.quiet) {
         for (std::size_t i = 0; i < photos_.size(); ++i)  // the others are where steps read them
             if (!dataset.views[i].is_test) photos_[i] = {};
         give_back_freed_memory();
@@ -126,7 +127,7 @@ class Run {
 
     Device& device_;
     const Dataset& dataset_;
-    const TrainOptions& options_;
+    const Schedule& schedule_;
     const RunOptions& run_;
     std::vector<ImageU8> photos_;  // [view]; while it trains of held-out views alone
     const std::string fingerprint_;
@@ -162,7 +163,7 @@ bool is_own(const std::filesystem::path& checkpoint, const std::filesystem::path
 void Run::resume() {
     const Checkpoint checkpoint = std::move(checkpoint_.value());
     checkpoint_.reset();
-    check_resumable(checkpoint, run_.resume_from, options_, dataset_, fingerprint_);
+    check_resumable(checkpoint, run_.resume_from, schedule_, dataset_, fingerprint_);
     trainer_.restore(checkpoint.state);
     watch_.restore(checkpoint.gain);
     if (watch_.state().end > 0) {
@@ -174,7 +175,7 @@ void Run::resume() {
     const bool own = is_own(run_.resume_from, run_.output);
     if (!own) set_aside(run_.output);
     own ? log_.go_on(checkpoint.state.iteration) : log_.begin();
-    progress_ = Progress(checkpoint.state.iteration + 1, options_.iterations, run_.quiet);
+    progress_ = Progress(checkpoint.state.iteration + 1, schedule_.iterations, run_.quiet);
     progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
                                checkpoint.state.iteration));
     if (checkpoint.tuning != tuning_)
@@ -232,7 +233,7 @@ void Run::save_model(int iteration) {
                                    summary_.model.string()));
     // Those that are frozen keep their numbers, by which they are taken out again.
     const std::size_t all = model.size();
-    summary_.undrawn = drop_undrawn(Schedule(options_).undrawn_opacity, run_.frozen, model);
+    summary_.undrawn = drop_undrawn(schedule_.undrawn_opacity, run_.frozen, model);
     summary_.saved = model.size();
     if (summary_.undrawn > 0)
         progress_.note(
@@ -256,7 +257,7 @@ void Run::write_cameras() {
 
 void Run::save_checkpoint(const std::filesystem::path& path) {
     stopwatch(false);
-    write_checkpoint(path, {trainer_.state(), settings_text(options_), fingerprint_, seconds_,
+    write_checkpoint(path, {trainer_.state(), settings_text(schedule_), fingerprint_, seconds_,
                             result_tuning(device_), watch_.state()});
     stopwatch(true);
 }
@@ -264,7 +265,7 @@ void Run::save_checkpoint(const std::filesystem::path& path) {
 // The stopwatch counts what the view draws, which shares the device, and no pause.
 void Run::show_step() {
     const double paused_s = run_.on_step({trainer_.splats(), trainer_.iteration(),
-                                          options_.iterations, latest_, summary_.evaluations});
+                                          schedule_.iterations, latest_, summary_.evaluations});
     seconds_ -= paused_s;
     progress_.leave_out(paused_s);
 }
@@ -289,7 +290,7 @@ TrainResult Run::finished() {
 }
 
 void Run::begin() {
-    check_ranks(device_, options_, run_.ranks, fingerprint_);
+    check_ranks(device_, schedule_, run_.ranks, fingerprint_);
     remove_leftovers(run_.output);
     if (!run_.resume_from.empty()) {
         resume();  // before anything of an earlier run is moved: it may be refused
@@ -299,7 +300,7 @@ void Run::begin() {
         if (run_.write_start) run_.write_start(run_.output / "dense_start");
     }
     write_cameras();
-    write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
+    write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, schedule_.options, run_.output));
     if (!run_.request.empty()) write_file_atomic(run_.output / "request.json", run_.request);
 }
 
@@ -311,8 +312,8 @@ TrainResult Run::execute(const std::atomic<bool>* stop) {
     std::error_code none;
     std::filesystem::remove(run_.output / "metrics.json", none);
     const std::optional<PaceForecast> pace = run_.pace ? run_.pace : log_.pace();
-    if (pace) progress_.expect(options_, *pace);
-    log_.start(device_, rates_, dataset_, options_, trainer_.splat_count(), run_.effects_json,
+    if (pace) progress_.expect(schedule_, *pace);
+    log_.start(device_, rates_, dataset_, schedule_, trainer_.splat_count(), run_.effects_json,
                pace);
     try {
         train(stop);
@@ -436,7 +437,7 @@ void Run::look_at_forms() {
         const TuningRecord seen =
             look_again(device_, *record,
                        {trainer_.splats(), camera_data(view->camera, trainer_.splats().origin()),
-                        trainer_.sh_degree(), forward_options(options_)});
+                        trainer_.sh_degree(), forward_options(schedule_.options)});
         write_tuning(device_.info(), device_.cache_folder(), seen);
         if (seen.choice != record->choice)
             progress_.note(
@@ -459,7 +460,7 @@ void Run::look_for_gain(int iteration) {
         summary_.ended_early = watch_.reason();
         log_.ends_early(iteration, trainer_.last_iteration(), summary_.ended_early);
         progress_.note(fmt::format("iteration {}: the run ends with iteration {} of {}: {}",
-                                   iteration, trainer_.last_iteration(), options_.iterations,
+                                   iteration, trainer_.last_iteration(), schedule_.iterations,
                                    summary_.ended_early));
     }
     stopwatch(true);
@@ -529,17 +530,17 @@ void Run::report_troubles() {
 
 }  // namespace
 
-TrainResult run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+TrainResult run_training(Device& device, const Dataset& dataset, const Schedule& schedule,
                          const RunOptions& run, const std::atomic<bool>* stop,
                          std::vector<ImageU8> photos) {
     for (const View& view : dataset.views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
     if (run.ranks.several() && !run.ranks.all->is_first())
-        return follow_training(device, dataset, options, run, stop, std::move(photos));
-    check_gain_watch(dataset, options, run.ranks);
+        return follow_training(device, dataset, schedule, run, stop, std::move(photos));
+    check_gain_watch(dataset, schedule.options, run.ranks);
     check_run_folder(run.output, dataset);
-    if (run.resume_from.empty() && !run.start) check_start_memory(device, dataset, options);
-    return Run(device, dataset, options, run, std::move(photos)).execute(stop);
+    if (run.resume_from.empty() && !run.start) check_start_memory(device, dataset, schedule);
+    return Run(device, dataset, schedule, run, std::move(photos)).execute(stop);
 }
 
 }  // namespace darb

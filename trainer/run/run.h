@@ -17,7 +17,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "trainer/options/options.h"
+#include "trainer/options/schedule.h"
 #include "trainer/run/evaluation.h"
 #include "trainer/run/run_report.h"
 #include "trainer/run/time_left.h"
@@ -96,7 +96,7 @@ std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& o
 /// saved once more as far as they can be. The caller holds the RunLock of the folder.
 /// photos: already loaded, in the order of the views; else empty. Once training photos are where
 /// steps read them, the run keeps the others alone.
-TrainResult run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+TrainResult run_training(Device& device, const Dataset& dataset, const Schedule& schedule,
                          const RunOptions& run, const std::atomic<bool>* stop = nullptr,
                          std::vector<ImageU8> photos = {});
 

@@ -135,13 +135,14 @@ void RunLog::write(const Json& event) {
 }
 
 void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset& dataset,
-                   const TrainOptions& options, std::uint32_t splats,
-                   const std::string& effects_json, const std::optional<PaceForecast>& pace) {
+                   const Schedule& schedule, std::uint32_t splats, const std::string& effects_json,
+                   const std::optional<PaceForecast>& pace) {
+    const TrainOptions& options = schedule.options;
     root_ = dataset.root;
     std::vector<std::string> notes;
     for (const std::string& note : dataset.notes) notes.push_back(shared_text(note));
     rates_ = rates;
-    counts_.rest_every = Schedule(options).rest_every;
+    counts_.rest_every = schedule.rest_every;
     const auto held_out = std::ranges::count_if(dataset.views, &View::is_test);
     start_ = {{"event", "start"},
               {"version", DARB_VERSION},
@@ -158,7 +159,7 @@ void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset
               {"strategy", strategy_name(options.strategy)},
               {"copy_bytes_per_s", rates_.bytes_per_s},
               {"fma_per_s", rates_.fma_per_s},
-              {"settings", Json::parse(settings_text(options))}};
+              {"settings", Json::parse(settings_text(schedule))}};
     if (!effects_json.empty()) start_["effects"] = Json::parse(effects_json);
     if (pace) start_["forecast"] = pace_json(*pace);
     write(start_);

@@ -38,7 +38,7 @@ class RunLog {
 
     /// rates: of the device, for the roofline.
     void start(const Device& device, const DeviceRates& rates, const Dataset& dataset,
-               const TrainOptions& options, std::uint32_t splats, const std::string& effects_json,
+               const Schedule& schedule, std::uint32_t splats, const std::string& effects_json,
                const std::optional<PaceForecast>& pace);
     /// Of the run that goes on, where it had one.
     std::optional<PaceForecast> pace() const;

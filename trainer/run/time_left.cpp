@@ -91,9 +91,9 @@ PaceForecast pace_from_json(const nlohmann::json& json) {
             json.at("longest_side").get<int>()};
 }
 
-TimeLeft::TimeLeft(const TrainOptions& options, const PaceForecast& pace)
-    : iterations_(options.iterations), pace_(pace) {
-    const Schedule schedule(options);
+TimeLeft::TimeLeft(const Schedule& schedule, const PaceForecast& pace)
+    : iterations_(schedule.iterations), pace_(pace) {
+    const TrainOptions& options = schedule.options;
     has_target_ = strategy_row(options.strategy).grows_to_limit;
     if (options.probe_sh && schedule.degree_interval < iterations_) {
         probe_at_ = schedule.degree_interval;
@@ -117,7 +117,7 @@ TimeLeft::TimeLeft(const TrainOptions& options, const PaceForecast& pace)
     std::uint32_t end = pace_.splats;
     if (!has_target_ && !pace_.falls && end > pace_.start_splats)
         end = static_cast<std::uint32_t>(std::min(kBeyondForecast * end, limit_));
-    counts_ = held_between_rounds(schedule, growth_path(options, pace_.start_splats, end));
+    counts_ = held_between_rounds(schedule, growth_path(schedule, pace_.start_splats, end));
     if (pace_.falls)
         for (int i = 0; i <= iterations_; ++i)
             counts_[static_cast<std::size_t>(i)] =

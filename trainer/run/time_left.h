@@ -10,7 +10,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <vector>
 
-#include "trainer/options/options.h"
+#include "trainer/options/schedule.h"
 #include "trainer/run/forecast.h"
 
 namespace darb {
@@ -31,7 +31,7 @@ PaceForecast pace_from_json(const nlohmann::json& json);
 
 class TimeLeft {
   public:
-    TimeLeft(const TrainOptions& options, const PaceForecast& pace);
+    TimeLeft(const Schedule& schedule, const PaceForecast& pace);
 
     /// seconds: of the run so far, as a clock has them; from the first call on they are measured.
     void add(int iteration, double seconds, std::uint32_t splats);

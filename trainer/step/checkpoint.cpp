@@ -290,8 +290,8 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
                        [&] { return parse_checkpoint(read_file(path), path.string()); });
 }
 
-std::string settings_text(const TrainOptions& options) {
-    return settings_json(options).dump();
+std::string settings_text(const Schedule& schedule) {
+    return settings_json(schedule).dump();
 }
 
 std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU8>& photos) {
@@ -329,12 +329,11 @@ namespace {
 constexpr const char* kOtherCheckpoint = "Start from another checkpoint, or without --resume.";
 
 // Of the looks at held-out photos, and of the end that follows from the last of them.
-std::string gain_contradiction(const GainState& gain, int iteration, const TrainOptions& o) {
+std::string gain_contradiction(const GainState& gain, int iteration, Schedule schedule) {
     if (gain.looks.empty() && gain.end == 0) return "";
-    if (o.end_without_gain == 0 || gain.looks.empty())
+    if (schedule.options.end_without_gain == 0 || gain.looks.empty())
         return "holds the end of a run that does not look for a gain";
     const int looked = gain.looks.back().iteration;
-    Schedule schedule(o);
     if (gain.end != 0) schedule.end_early(looked);
     if (looked > iteration || iteration > schedule.last ||
         (gain.end != 0 && gain.end != schedule.last))
@@ -344,7 +343,8 @@ std::string gain_contradiction(const GainState& gain, int iteration, const Train
 }
 
 // What the settings say and the state does not follow, which no run writes.
-std::string contradiction(const Checkpoint& checkpoint, const TrainOptions& o, size_t photos) {
+std::string contradiction(const Checkpoint& checkpoint, const Schedule& schedule, size_t photos) {
+    const TrainOptions& o = schedule.options;
     const TrainerState& s = checkpoint.state;
     const SplatModel& m = s.model;
     if (m.kernel != o.kernel || m.footprint != o.footprint)
@@ -364,9 +364,10 @@ std::string contradiction(const Checkpoint& checkpoint, const TrainOptions& o, s
          (!o.exposure || s.exposure.size() !=
                              exposure_maps(o, static_cast<std::uint32_t>(photos)).state_size())) ||
         (!s.cameras.empty() && !o.refine_cameras) ||
-        (!s.rest_sum.empty() && Schedule(o).rest_every <= 1))
+        (!s.rest_sum.empty() && schedule.rest_every <= 1))
         return "holds what the run's effects and strategy have no use for";
-    if (const std::string what = gain_contradiction(checkpoint.gain, s.iteration, o); !what.empty())
+    if (const std::string what = gain_contradiction(checkpoint.gain, s.iteration, schedule);
+        !what.empty())
         return what;
     if (std::int64_t{s.averaged} > s.iteration)
         return fmt::format("holds a mean of {} iterations after {}", s.averaged, s.iteration);
@@ -404,15 +405,15 @@ std::string settings_differences(const Json& before, const Json& now) {
 }
 
 void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
-                     const TrainOptions& options, const Dataset& dataset,
+                     const Schedule& schedule, const Dataset& dataset,
                      const std::string& fingerprint) {
     const Json before = settings_of(checkpoint, path.string());
-    const Json now = Json::parse(settings_text(options));
+    const Json now = Json::parse(settings_text(schedule));
     const std::string strategy = before.value("strategy", std::string(strategy_name(Strategy{})));
-    if (strategy != strategy_name(options.strategy))
+    if (strategy != strategy_name(schedule.strategy))
         throw Error(path.string(),
                     fmt::format("was written with --strategy {}, this is --strategy {}", strategy,
-                                strategy_name(options.strategy)),
+                                strategy_name(schedule.strategy)),
                     "Repeat the strategy of that run, or start without --resume.");
     if (const std::string differences = settings_differences(before, now); !differences.empty())
         throw Error(path.string(), "was written with other settings:" + differences,
@@ -425,7 +426,7 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
             "or start without --resume.");
     const auto photos = static_cast<size_t>(
         std::ranges::count_if(dataset.views, [](const View& v) { return !v.is_test; }));
-    if (const std::string what = contradiction(checkpoint, options, photos); !what.empty())
+    if (const std::string what = contradiction(checkpoint, schedule, photos); !what.empty())
         throw Error(path.string(), what, kOtherCheckpoint);
 }
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "engine/data/dataset.h"
-#include "trainer/options/options.h"
+#include "trainer/options/schedule.h"
 #include "trainer/step/gain_watch.h"
 #include "trainer/step/trainer_state.h"
 
@@ -35,7 +35,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path);
 Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& where);
 
 /// Every option that changes the result, as one JSON object in text.
-std::string settings_text(const TrainOptions& options);
+std::string settings_text(const Schedule& schedule);
 /// Each setting that differs between two objects of settings, with both values; "": none does.
 std::string settings_differences(const nlohmann::json& before, const nlohmann::json& now);
 /// Names, sizes, cameras and points of a data set and the pixels of its photos (or none), hashed;
@@ -45,7 +45,7 @@ std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU
 /// Throws Error naming each difference when the checkpoint is of other settings or another data
 /// set. fingerprint: that of the data set now.
 void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
-                     const TrainOptions& options, const Dataset& dataset,
+                     const Schedule& schedule, const Dataset& dataset,
                      const std::string& fingerprint);
 
 }  // namespace darb

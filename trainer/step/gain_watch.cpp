@@ -30,8 +30,8 @@ void check_gain_watch(const Dataset& dataset, const TrainOptions& options, const
                     "Add --eval, or leave it out.");
 }
 
-GainWatch::GainWatch(const TrainOptions& options, const Schedule& schedule)
-    : patience_(options.end_without_gain),
+GainWatch::GainWatch(const Schedule& schedule)
+    : patience_(schedule.options.end_without_gain),
       begin_(schedule.rounds.end),
       end_(schedule.averages() ? schedule.average_begin : schedule.iterations) {}
 

@@ -31,7 +31,7 @@ void check_gain_watch(const Dataset& dataset, const TrainOptions& options, const
 class GainWatch {
   public:
     /// options.end_without_gain iterations without a gain end a run; 0: it never looks.
-    GainWatch(const TrainOptions& options, const Schedule& schedule);
+    explicit GainWatch(const Schedule& schedule);
 
     /// Whether photos are to be looked at after the step that did the iterations (begin,
     /// iteration]: four times in as many iterations as may go without a gain, between the end of

@@ -151,8 +151,8 @@ std::uint64_t splats_within(const Device& device, const MemoryDemand& demand,
     return splats;
 }
 
-void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand) {
-    const Schedule schedule(options);
+void add_photos(const std::vector<View>& views, const Schedule& schedule, MemoryDemand& demand) {
+    const TrainOptions& options = schedule.options;
     demand.sh_degree = options.sh_degree;
     demand.rest_sum = schedule.rest_every > 1;
     demand.frame = forward_options(options);
@@ -203,8 +203,9 @@ std::uint64_t usable_bytes(const DeviceInfo& info) {
     return static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(info.heap_bytes));
 }
 
-bool photos_stream(const Device& device, const Dataset& dataset, const TrainOptions& options,
+bool photos_stream(const Device& device, const Dataset& dataset, const Schedule& schedule,
                    const MemoryDemand& photos, std::uint32_t start_splats) {
+    const TrainOptions& options = schedule.options;
     const PhotoPlace place = device.tuning().photos;
     if (place != PhotoPlace::automatic) return place == PhotoPlace::streamed;
     const bool shared = device.info().unified_memory;
@@ -215,8 +216,7 @@ bool photos_stream(const Device& device, const Dataset& dataset, const TrainOpti
     if (shared) {  // the ramp does without its smaller photos where there is no room
         all.small_pixels = all.small_cameras = 0;
     } else {
-        const Schedule schedule(options);
-        all.splats = std::max(start_splats, wanted_splats(device, dataset, options,
+        all.splats = std::max(start_splats, wanted_splats(device, dataset, schedule,
                                                           photos.photo_pixels, start_splats));
         all.densifies = has_rounds(schedule);
         all.averages = schedule.averages();
@@ -230,11 +230,11 @@ bool photos_stream(const Device& device, const Dataset& dataset, const TrainOpti
            plan_memory(device, streamed).total() < total;
 }
 
-MemoryBudget::MemoryBudget(Device& device, const Dataset& dataset, const TrainOptions& options,
-                           const Schedule& schedule, std::uint32_t start_splats)
-    : device_(&device), options_(options), schedule_(schedule) {
-    add_photos(dataset.views, options, photos_);
-    photos_.streams = photos_stream(device, dataset, options, photos_, start_splats);
+MemoryBudget::MemoryBudget(Device& device, const Dataset& dataset, const Schedule& schedule,
+                           std::uint32_t start_splats)
+    : device_(&device), schedule_(schedule) {
+    add_photos(dataset.views, schedule, photos_);
+    photos_.streams = photos_stream(device, dataset, schedule, photos_, start_splats);
 }
 
 MemoryDemand MemoryBudget::demand(const HeldMemory& held) const {
@@ -288,9 +288,9 @@ MemoryDemand MemoryBudget::growth_demand(const HeldMemory& held,
         grown.small_pixels = std::max(grown.small_pixels, photos_.small_pixels);
         most *= static_cast<std::uint64_t>(held.divisor);
     }
-    if (options_.probe_sh)  // what is on trial is to have room, and what follows it
-        grown.sh_degree = grown.sh_degree == 0 ? std::min(1, options_.sh_degree)
-                                               : predict_degree(options_, options_.iterations);
+    if (schedule_.options.probe_sh)  // what is on trial is to have room, and what follows it
+        grown.sh_degree = grown.sh_degree == 0 ? std::min(1, schedule_.options.sh_degree)
+                                               : predict_degree(schedule_, schedule_.iterations);
     grown.room_splats = 0;
     grown.intersections = std::max(4 * grown.splats, most + most / 2);
     grown.intersections += grown.intersections / 2;
@@ -303,7 +303,7 @@ MemoryDemand MemoryBudget::growth_demand(const HeldMemory& held,
 
 // Of the budget, less what is in use beyond the plan.
 std::uint64_t MemoryBudget::bytes_to_plan(const HeldMemory& held) const {
-    const std::uint64_t budget = options_.max_memory_bytes.value_or(0);
+    const std::uint64_t budget = schedule_.options.max_memory_bytes.value_or(0);
     const std::uint64_t in_use = device_->allocated_bytes();
     const std::uint64_t planned = plan_memory(*device_, demand(held)).resident();
     const std::uint64_t extra = in_use - std::min(in_use, planned);
@@ -312,7 +312,7 @@ std::uint64_t MemoryBudget::bytes_to_plan(const HeldMemory& held) const {
 
 std::uint32_t MemoryBudget::splats_within_memory(const HeldMemory& held,
                                                  const TrainCounters& counters) const {
-    if (!options_.max_memory_bytes || held.splats == 0) return kNoLimit;
+    if (!schedule_.options.max_memory_bytes || held.splats == 0) return kNoLimit;
     const std::uint64_t within =
         splats_within(*device_, growth_demand(held, counters), bytes_to_plan(held));
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(within, kNoLimit));
@@ -323,8 +323,8 @@ std::uint32_t MemoryBudget::growth_limit(const HeldMemory& held, const TrainCoun
     const bool near = counters.most_intersections >
                       kMostIntersections * FrameBuffers::max_intersections(*device_);
     if (near && stopped_by_intersections_ == 0) stopped_by_intersections_ = held.splats;
-    limit_ = std::min({options_.max_splats.value_or(kNoLimit), within_memory_,
-                       GpuSplats::max_count(*device_, options_.sh_degree, true),
+    limit_ = std::min({schedule_.options.max_splats.value_or(kNoLimit), within_memory_,
+                       GpuSplats::max_count(*device_, schedule_.options.sh_degree, true),
                        near ? held.splats : kNoLimit});
     return limit_;
 }
@@ -334,12 +334,12 @@ void MemoryBudget::end_round(std::uint32_t splats) {
 }
 
 bool MemoryBudget::has_room_for_round(const HeldMemory& held) const {
-    if (!options_.max_memory_bytes) return true;
+    if (!schedule_.options.max_memory_bytes) return true;
     return round_peak(*device_, demand(held), held.splats, held.splats) <= bytes_to_plan(held);
 }
 
 bool MemoryBudget::has_room_for_degree(const HeldMemory& held, int degree) const {
-    if (!options_.max_memory_bytes) return true;
+    if (!schedule_.options.max_memory_bytes) return true;
     MemoryDemand wanted = demand(held);
     wanted.sh_degree = degree;
     wanted.averages = schedule_.averages();

@@ -86,7 +86,7 @@ std::uint64_t splats_within(const Device& device, const MemoryDemand& demand,
 
 /// What a data set, the run's effects and its strategy demand: all but splats, intersections and
 /// densifies. sh_degree: the highest that the run may reach. Of a resolution ramp: its larger step.
-void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand);
+void add_photos(const std::vector<View>& views, const Schedule& schedule, MemoryDemand& demand);
 
 // MemoryBudget: what a run takes of device memory while it goes: the plan for what it holds now,
 // the peak of all plans so far, and where a budget, or the intersections that the device binds,
@@ -97,7 +97,7 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
 /// the run is forecast to come to fits into options.max_memory_bytes, or the most of the device
 /// that a run can hope for. Where host and device share theirs streaming frees nothing, and a
 /// budget alone calls for it, where it does not hold the start. photos: as add_photos gives them.
-bool photos_stream(const Device& device, const Dataset& dataset, const TrainOptions& options,
+bool photos_stream(const Device& device, const Dataset& dataset, const Schedule& schedule,
                    const MemoryDemand& photos, std::uint32_t start_splats);
 /// Of the device's memory, what a run can hope to have.
 std::uint64_t usable_bytes(const DeviceInfo& info);
@@ -115,8 +115,8 @@ struct HeldMemory {
 
 class MemoryBudget {
   public:
-    MemoryBudget(Device& device, const Dataset& dataset, const TrainOptions& options,
-                 const Schedule& schedule, std::uint32_t start_splats);
+    MemoryBudget(Device& device, const Dataset& dataset, const Schedule& schedule,
+                 std::uint32_t start_splats);
 
     /// Whether photos are to wait on the host: photos_stream().
     bool streams_photos() const { return photos_.streams; }
@@ -152,7 +152,6 @@ class MemoryBudget {
     std::uint32_t splats_within_memory(const HeldMemory& held, const TrainCounters& counters) const;
 
     Device* device_;
-    TrainOptions options_;
     Schedule schedule_;
     MemoryDemand photos_;  // of photos, effects and strategy alone
     std::array<std::uint64_t, 6> recorded_{};

@@ -11,11 +11,10 @@ namespace {
 constexpr float kTrialRestRate = 0.2f;
 }  // namespace
 
-Optimizer::Optimizer(const TrainOptions& options, const Schedule& schedule, double extent,
-                     double reach, std::size_t photos)
+Optimizer::Optimizer(const Schedule& schedule, double extent, double reach, std::size_t photos)
     : schedule_(schedule),
-      opacity_weight_(options.opacity_weight),
-      scale_weight_(options.scale_weight),
+      opacity_weight_(schedule.options.opacity_weight),
+      scale_weight_(schedule.options.scale_weight),
       extent_(extent),
       reach_(reach),
       photos_(photos) {}

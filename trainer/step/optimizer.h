@@ -14,8 +14,7 @@ class Optimizer {
   public:
     /// extent, reach: scene_extent() and scene_reach(), world units. photos: how many are trained
     /// on.
-    Optimizer(const TrainOptions& options, const Schedule& schedule, double extent, double reach,
-              std::size_t photos);
+    Optimizer(const Schedule& schedule, double extent, double reach, std::size_t photos);
 
     /// The step of an iteration, from 1, or of the batch that ends with it. The caller sets its
     /// clearance, which depends on the view.

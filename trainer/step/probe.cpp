@@ -20,9 +20,9 @@ int probe_iterations(const Schedule& schedule) {
     return 2 * static_cast<int>(std::lround(kArmIterations / std::sqrt(schedule.speedup)));
 }
 
-DegreeProbe::DegreeProbe(const TrainOptions& options, const Schedule& schedule)
-    : on_(options.probe_sh),
-      highest_degree_(options.sh_degree),
+DegreeProbe::DegreeProbe(const Schedule& schedule)
+    : on_(schedule.options.probe_sh),
+      highest_degree_(schedule.options.sh_degree),
       schedule_(schedule),
       next_(schedule.degree_interval) {}
 

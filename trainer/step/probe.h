@@ -37,7 +37,7 @@ int probe_iterations(const Schedule& schedule);
 
 class DegreeProbe {
   public:
-    DegreeProbe(const TrainOptions& options, const Schedule& schedule);
+    explicit DegreeProbe(const Schedule& schedule);
 
     /// Whether a probe is due after the step that ends with this iteration, for splats of this
     /// degree.

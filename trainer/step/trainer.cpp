@@ -65,45 +65,47 @@ class ShownMean {
 }  // namespace
 
 Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
-                 const SplatModel& start, const TrainOptions& options, RankGroup ranks,
+                 const SplatModel& start, const Schedule& schedule, RankGroup ranks,
                  std::uint32_t frozen)
-    : device_(&with_budget(device, options)),
+    : device_(&with_budget(device, schedule.options)),
       ranks_(ranks.all ? ranks : RankGroup{&alone_}),
-      options_(options),
-      schedule_(options),
-      background_(options.white_background ? 1.0f : 0.0f),
+      schedule_(schedule),
+      background_(schedule.options.white_background ? 1.0f : 0.0f),
       extent_(scene_extent(dataset)),
-      memory_(device, dataset, options, schedule_, static_cast<std::uint32_t>(start.size())),
-      splats_(device, start_model(start, options), true, schedule_.rest_every > 1),
-      photos_(device, dataset, photos, splats_.origin(), memory_.streams_photos(), options.depth),
-      order_(photos_.views(), options.seed),
-      optimizer_(options, schedule_, extent_, scene_reach(dataset), photos_.count()),
-      density_(device, options.kernel, options.footprint),
-      strategy_(strategy_row(options.strategy).make({device, options_, schedule_, extent_})),
+      memory_(device, dataset, schedule, static_cast<std::uint32_t>(start.size())),
+      splats_(device, start_model(start, schedule.options), true, schedule_.rest_every > 1),
+      photos_(device, dataset, photos, splats_.origin(), memory_.streams_photos(),
+              schedule.options.depth),
+      order_(photos_.views(), schedule.options.seed),
+      optimizer_(schedule, extent_, scene_reach(dataset), photos_.count()),
+      density_(device, schedule.options.kernel, schedule.options.footprint),
+      strategy_(strategy_row(schedule.strategy).make({device, schedule_, extent_})),
       average_(device),
-      probe_(options, schedule_),
-      step_(device, splats_, photos_, loss_options(options, dataset), options) {
-    check_batch(*ranks_.all, options.batch);
+      probe_(schedule),
+      step_(device, splats_, photos_, loss_options(schedule.options, dataset), schedule.options) {
+    check_batch(*ranks_.all, schedule.options.batch);
     splats_.freeze(frozen);
     step_.on_finished = [this](const StepOutcome& outcome) { finish(outcome); };
     step_.on_reserved = [this] { memory_.record(held()); };
-    if (options_.antialias)
-        smoothing_.emplace(device, forward_options(options).effects, photos_.training_cameras());
-    if (options_.morton_order) morton_.emplace(device);
-    if (options_.refine_cameras) cameras_.emplace(dataset, options_);
-    if (steps_by_views(options_)) tree_.emplace(device, options_.batch);
+    if (schedule.options.antialias)
+        smoothing_.emplace(device, forward_options(schedule.options).effects,
+                           photos_.training_cameras());
+    if (schedule.options.morton_order) morton_.emplace(device);
+    if (schedule.options.refine_cameras) cameras_.emplace(dataset, schedule.options);
+    if (steps_by_views(schedule.options)) tree_.emplace(device, schedule.options.batch);
     set_resolution(1);
     update_smoothing();
     step_.reserve(photos_.largest_width(), photos_.largest_height());
 }
 
 int Trainer::degree_at(int iteration) const {
-    return options_.probe_sh ? splats_.sh_degree() : schedule_.sh_degree(iteration);
+    return schedule_.options.probe_sh ? splats_.sh_degree() : schedule_.sh_degree(iteration);
 }
 
 glm::vec3 Trainer::background_for(int iteration) const {
-    if (!options_.random_background) return background_;
-    Pcg32 random(options_.seed, 0x6261636Bull << 32 | static_cast<std::uint32_t>(iteration));
+    if (!schedule_.options.random_background) return background_;
+    Pcg32 random(schedule_.options.seed,
+                 0x6261636Bull << 32 | static_cast<std::uint32_t>(iteration));
     glm::vec3 colour;
     for (int c = 0; c < 3; ++c) colour[c] = static_cast<float>(random.uniform());
     return colour;
@@ -115,7 +117,8 @@ StepInput Trainer::input_for(int iteration, int view, int last) const {
     input.iteration = iteration;
     input.view = photos_.view(view, degree_at(last), background_for(iteration));
     input.adam = optimizer_.step(last);
-    input.adam.clearance = static_cast<float>(options_.clearance * photos_.nearest_distance(view));
+    input.adam.clearance =
+        static_cast<float>(schedule_.options.clearance * photos_.nearest_distance(view));
     input.adam.splats_gone = totals_.counters.undrawn;
     input.exposure_rate = static_cast<float>(schedule_.exposure_rate(iteration));
     input.exposure_visits = (iteration - 1) / static_cast<int>(photos_.count()) + 1;
@@ -152,7 +155,7 @@ void Trainer::run_batch() {
         views.back().place = i - iteration_ - 1;
     }
     const std::vector<StepOutcome> outcomes =
-        run_batch_step(step_, *tree_, splats_, views, *ranks_.all, options_.batch);
+        run_batch_step(step_, *tree_, splats_, views, *ranks_.all, schedule_.options.batch);
     iteration_ = end;
     if (cameras_) refine_cameras(views, outcomes);
     for (const StepOutcome& outcome : outcomes) finish(outcome);
@@ -235,14 +238,14 @@ std::optional<DensityResult> Trainer::control_density() {
 
 gpu::DensifyArgs Trainer::round_args(int iteration) const {
     gpu::DensifyArgs args{};
-    args.gradient_threshold = options_.densify_grad_threshold;
+    args.gradient_threshold = schedule_.options.densify_grad_threshold;
     const double length = optimizer_.length();
-    args.clone_split_scale = static_cast<float>(options_.clone_split_extent * length);
+    args.clone_split_scale = static_cast<float>(schedule_.options.clone_split_extent * length);
     args.prune_opacity = schedule_.prune_opacity;
     args.prune_scale = schedule_.prunes_by_size(iteration)
-                           ? static_cast<float>(options_.prune_extent * length)
+                           ? static_cast<float>(schedule_.options.prune_extent * length)
                            : 0.0f;
-    args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);
+    args.seed = static_cast<std::uint32_t>(schedule_.options.seed * 0x9E3779B9u + iteration);
     return args;
 }
 

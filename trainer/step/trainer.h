@@ -93,7 +93,7 @@ class Trainer {
     /// together, each with such a trainer; null: this one alone. Throws Error where the batch has
     /// no equal parts for them.
     Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
-            const SplatModel& start, const TrainOptions& options, RankGroup ranks = {},
+            const SplatModel& start, const Schedule& schedule, RankGroup ranks = {},
             std::uint32_t frozen = 0);
     Trainer(const Trainer&) = delete;
     Trainer& operator=(const Trainer&) = delete;
@@ -114,11 +114,12 @@ class Trainer {
     /// Iterations finished or under way.
     int iteration() const { return iteration_; }
     /// The iteration that the run ends with: that of the options, or sooner after end_early().
+    const Schedule& schedule() const { return schedule_; }
     int last_iteration() const { return schedule_.last; }
     /// The run is to end sooner, as Schedule::end_early() has it. Not part of state(): after
     /// restore(), call it again with the same iteration.
     void end_early(int iteration) { schedule_.end_early(iteration); }
-    int views_a_step() const { return options_.batch; }
+    int views_a_step() const { return schedule_.batch; }
     std::uint32_t splat_count() const { return splats_.count(); }
     /// On the device, for work on the same queue between steps; the object stays, its buffers are
     /// replaced by density control.
@@ -186,7 +187,6 @@ class Trainer {
     Device* device_;
     OneRank alone_;
     RankGroup ranks_;
-    TrainOptions options_;
     Schedule schedule_;
     glm::vec3 background_;
     double extent_;  // of the scene

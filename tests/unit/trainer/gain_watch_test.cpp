@@ -17,7 +17,7 @@ TrainOptions patient(int iterations) {
 }
 
 GainWatch watch_of(const TrainOptions& options) {
-    return GainWatch(options, Schedule(options));
+    return GainWatch(Schedule(options));
 }
 
 TEST(GainWatch, looks_four_times_in_its_patience_between_growth_and_the_mean) {

@@ -10,7 +10,7 @@ namespace darb {
 namespace {
 
 Optimizer optimizer_of(const TrainOptions& options, double extent = 2, double reach = 7) {
-    return Optimizer(options, Schedule(options), extent, reach, 20);
+    return Optimizer(Schedule(options), extent, reach, 20);
 }
 
 TEST(Optimizer, positions_and_regularisers_are_in_units_of_the_scene) {
@@ -81,10 +81,10 @@ TEST(Optimizer, a_batch_regularises_the_unseen_in_the_share_of_its_views) {
     TrainOptions options;
     options.batch = 4;
     const Schedule schedule(options);
-    EXPECT_EQ(Optimizer(options, schedule, 2, 7, 20).step(8).regularise_unseen, 1);
-    EXPECT_EQ(Optimizer(options, schedule, 2, 7, 100).step(8).regularise_unseen, 0.5f);
+    EXPECT_EQ(Optimizer(schedule, 2, 7, 20).step(8).regularise_unseen, 1);
+    EXPECT_EQ(Optimizer(schedule, 2, 7, 100).step(8).regularise_unseen, 0.5f);
     options.batch = 1;
-    EXPECT_EQ(Optimizer(options, Schedule(options), 2, 7, 100).step(7).regularise_unseen, 0);
+    EXPECT_EQ(Optimizer(Schedule(options), 2, 7, 100).step(7).regularise_unseen, 0);
 }
 
 }  // namespace

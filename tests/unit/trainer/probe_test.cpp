@@ -61,19 +61,19 @@ std::vector<int> views(int count) {
 
 TEST(DegreeProbe, is_due_at_its_iteration_until_the_highest_degree) {
     const TrainOptions options = probing();
-    const DegreeProbe probe(options, Schedule(options));
+    const DegreeProbe probe{Schedule(options)};
     EXPECT_FALSE(probe.is_due(999, 0));
     EXPECT_TRUE(probe.is_due(1'000, 0));
     EXPECT_TRUE(probe.is_due(1'000, 2));
     EXPECT_FALSE(probe.is_due(1'000, 3));
     TrainOptions off = options;
     off.probe_sh = false;
-    EXPECT_FALSE(DegreeProbe(off, Schedule(off)).is_due(1'000, 0));
+    EXPECT_FALSE(DegreeProbe(Schedule(off)).is_due(1'000, 0));
 }
 
 TEST(DegreeProbe, both_arms_start_from_the_same_state_and_train_alike) {
     const TrainOptions options = probing();
-    DegreeProbe probe(options, Schedule(options));
+    DegreeProbe probe{Schedule(options)};
     FakeRun run{.gain_db = 0.5};
     TrainerState state = state_at(1'000);
     probe.run(state, views(20), true, run.fork());
@@ -99,7 +99,7 @@ TEST(DegreeProbe, both_arms_start_from_the_same_state_and_train_alike) {
 
 TEST(DegreeProbe, a_gain_admits_the_degree_and_tries_the_next_an_interval_later) {
     const TrainOptions options = probing();
-    DegreeProbe probe(options, Schedule(options));
+    DegreeProbe probe{Schedule(options)};
     FakeRun run{.gain_db = 0.5};
     TrainerState state = state_at(1'000);
     probe.run(state, views(20), true, run.fork());
@@ -114,7 +114,7 @@ TEST(DegreeProbe, a_gain_admits_the_degree_and_tries_the_next_an_interval_later)
 
 TEST(DegreeProbe, a_loss_leaves_the_state_and_tries_again_after_as_many_iterations) {
     const TrainOptions options = probing();
-    DegreeProbe probe(options, Schedule(options));
+    DegreeProbe probe{Schedule(options)};
     FakeRun run{.gain_db = -0.5};
     TrainerState state = state_at(1'000);
     probe.run(state, views(20), true, run.fork());
@@ -130,7 +130,7 @@ TEST(DegreeProbe, a_loss_leaves_the_state_and_tries_again_after_as_many_iteratio
 TEST(DegreeProbe, nothing_is_trained_where_nothing_can_be_measured) {
     const TrainOptions options = probing();
     for (const bool has_room : {false, true}) {
-        DegreeProbe probe(options, Schedule(options));
+        DegreeProbe probe{Schedule(options)};
         FakeRun run{.gain_db = 0};
         TrainerState state = state_at(1'000);
         probe.run(state, views(has_room ? 7 : 20), has_room, run.fork());
