@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Run by the build: -DROOT=..., -DOUT=...: the names of the specialization constants that the shaders declare, for
-# engine/gpu/constant_name.h.
+# engine/gpu/pipeline.h.
 cmake_policy(VERSION 3.22)
 file(GLOB_RECURSE shaders ${ROOT}/shaders/*.comp ${ROOT}/shaders/*.glsl)
 set(names "")

@@ -40,7 +40,7 @@ std::span<const ShaderBinary> shader_table() {
   target_link_libraries(${target} PUBLIC darb_options)
 endfunction()
 
-# darb_constant_names(TARGET): the names of all specialization constants, generated for engine/gpu/constant_name.h, which
+# darb_constant_names(TARGET): the names of all specialization constants, generated for engine/gpu/pipeline.h, which
 # TARGET has. What links it is compiled after them.
 function(darb_constant_names target)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/shaders/*.comp ${PROJECT_SOURCE_DIR}/shaders/*.glsl)

@@ -8,12 +8,13 @@
 #include <cstdio>
 
 #include "engine/core/error.h"
-#include "engine/data/compare_view.h"
 #include "engine/data/image_io.h"
+#include "engine/data/metrics.h"
 #include "engine/gpu/device.h"
 #include "engine/render/renderer.h"
-#include "engine/scene/orbit_cameras.h"
+#include "engine/scene/camera.h"
 #include "engine/scene/splat_file.h"
+#include "engine/scene/subject.h"
 
 int main(int argc, char** argv) try {
     if (argc < 3 || argc > 4) {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "engine/core/error.h"
-#include "engine/data/compare_view.h"
 #include "engine/data/dataset.h"
+#include "engine/data/metrics.h"
 #include "engine/gpu/device.h"
 #include "engine/scene/splat_file.h"
 #include "trainer/growth/initial_model.h"

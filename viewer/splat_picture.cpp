@@ -9,7 +9,7 @@
 #include "engine/primitives/groups.h"
 #include "engine/raster/frame_view.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "engine/check/check_report.h"
 #include "engine/check/device_walk.h"
-#include "engine/reference/random_scene.h"
+#include "engine/check/run_checks.h"
+#include "engine/reference/splats.h"
 
 namespace darb::check {
 

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <glm/glm.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -158,5 +159,15 @@ double scene_reach(const Dataset& dataset);
 /// For each view, the distance from its camera to the nearest points, leaving the nearest hundredth
 /// aside; 0 where there are no points.
 std::vector<double> nearest_points(const Dataset& dataset);
+
+/// A box around what the cameras of a data set look at.
+struct WatchedBox {
+    glm::dvec3 centre;  // world
+    glm::dvec3 half;    // half the lengths of the sides, world units
+};
+
+/// The cube around the point that the optical axes of the training views come closest to, as wide
+/// as the photos show there; where the axes are parallel, the bounding box of the cameras.
+WatchedBox region_in_view(const Dataset& dataset);
 
 }  // namespace darb

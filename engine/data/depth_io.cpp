@@ -19,7 +19,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/byte_reader.h"
-#include "engine/data/photo_decoder.h"
+#include "engine/data/image_io.h"
 
 namespace darb {
 

@@ -16,7 +16,6 @@
 #include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
 #include "engine/data/lens_model.h"
-#include "engine/data/resample.h"
 #include "engine/data/source.h"
 
 namespace darb {

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "engine/core/error.h"
-#include "engine/data/resample.h"
+#include "engine/data/image_io.h"
 
 namespace darb {
 

@@ -19,7 +19,6 @@
 #include "engine/core/on_threads.h"
 #include "engine/data/dataset.h"
 #include "engine/data/image_io.h"
-#include "engine/data/resample.h"
 #include "engine/data/source.h"
 
 namespace darb {

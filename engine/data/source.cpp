@@ -18,7 +18,6 @@
 #include "engine/data/image_io.h"
 #include "engine/data/lens_model.h"
 #include "engine/data/point_cloud_ply.h"
-#include "engine/data/resample.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/stored_units.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The only translation unit with the code of stb_image_write. Pictures are read by other libraries:
-// see photo_decoder.h.
+// see image_io.h.
 #pragma GCC diagnostic ignored "-Wconversion"
 #pragma GCC diagnostic ignored "-Wshadow"
 #pragma GCC diagnostic ignored "-Wextra"

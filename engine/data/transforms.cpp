@@ -16,12 +16,12 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/depths.h"
 #include "engine/data/image_io.h"
 #include "engine/data/lens_model.h"
 #include "engine/data/masks.h"
 #include "engine/data/point_cloud_ply.h"
-#include "engine/data/pose.h"
 #include "engine/data/source.h"
 
 namespace darb {

@@ -2,7 +2,6 @@
 #include "engine/gpu/buffer.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cstring>
 #include <functional>
@@ -11,7 +10,6 @@
 
 #include "engine/core/error.h"
 #include "engine/gpu/barriers.h"
-#include "engine/gpu/device_memory.h"
 #include "engine/gpu/device_state.h"
 
 namespace darb {

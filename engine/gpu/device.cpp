@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "engine/gpu/device.h"
+#include "engine/gpu/shader_table.h"
 
 #include <fmt/format.h>
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <string_view>
@@ -11,10 +14,9 @@
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
-#include "engine/gpu/device_memory.h"
+#include "engine/core/user_folders.h"
 #include "engine/gpu/device_state.h"
-#include "engine/gpu/shader_features.h"
-#include "engine/gpu/shader_table.h"
+#include "engine/gpu/pipeline.h"
 #include "engine/gpu/spirv_reflect.h"
 
 namespace darb {
@@ -642,6 +644,145 @@ void check_vulkan(VkResult result, const std::string& what) {
             throw Error(what, fmt::format("VkResult {}", static_cast<int>(result)),
                         "Run with DARB_VALIDATION=1 for details.");
     }
+}
+
+namespace {
+
+// The key of Mesa's shader cache leaves out lavapipe's vector width: a cache filled at one width
+// gives wrong sums at another (seen on Mesa 22.3), so each width gets its own folder.
+void separate_mesa_caches(const std::filesystem::path& root) {
+    if (root.empty() || std::getenv("MESA_SHADER_CACHE_DIR") != nullptr) return;
+    const char* width = std::getenv("LP_NATIVE_VECTOR_WIDTH");
+    const std::filesystem::path folder =
+        root / ("mesa-width-" + std::string(width != nullptr ? width : "default"));
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (!error) ::setenv("MESA_SHADER_CACHE_DIR", folder.c_str(), 0);
+}
+
+}  // namespace
+
+DeviceOptions command_device(const std::string& select) {
+    DeviceOptions options;
+    options.select = select;
+    options.cache_folder = cache_folder();
+    separate_mesa_caches(options.cache_folder);
+    const char* validation = std::getenv("DARB_VALIDATION");
+    options.validation =
+        validation != nullptr && *validation != '\0' && std::string_view(validation) != "0";
+    if (const char* faults = std::getenv("DARB_FAULT")) options.faults = parse_faults(faults);
+    return options;
+}
+
+namespace {
+
+using Feature = VkBool32& (*)(DeviceFeatures&);
+
+// A capability is covered by a feature, by a kind of subgroup operations, or by Vulkan 1.3 itself.
+struct Capability {
+    std::uint32_t number;  // in the SPIR-V specification, section 3.31
+    const char* name;      // name of the feature or operations
+    Feature feature = nullptr;
+    VkSubgroupFeatureFlags operations = 0;
+};
+
+#define DARB_FEATURE(path) [](DeviceFeatures& f) -> VkBool32& { return f.path; }
+const Capability kCapabilities[] = {
+    {1, "compute shaders"},
+    {9, "shaderFloat16", DARB_FEATURE(v12.shaderFloat16)},
+    {10, "shaderFloat64", DARB_FEATURE(core.features.shaderFloat64)},
+    {11, "shaderInt64", DARB_FEATURE(core.features.shaderInt64)},
+    {12, "shaderBufferInt64Atomics", DARB_FEATURE(v12.shaderBufferInt64Atomics)},
+    {22, "shaderInt16", DARB_FEATURE(core.features.shaderInt16)},
+    {39, "shaderInt8", DARB_FEATURE(v12.shaderInt8)},
+    {61, "subgroup operations", nullptr, VK_SUBGROUP_FEATURE_BASIC_BIT},
+    {62, "subgroup votes", nullptr, VK_SUBGROUP_FEATURE_VOTE_BIT},
+    {63, "subgroup arithmetic", nullptr, VK_SUBGROUP_FEATURE_ARITHMETIC_BIT},
+    {64, "subgroup ballots", nullptr, VK_SUBGROUP_FEATURE_BALLOT_BIT},
+    {65, "subgroup shuffles", nullptr, VK_SUBGROUP_FEATURE_SHUFFLE_BIT},
+    {66, "relative subgroup shuffles", nullptr, VK_SUBGROUP_FEATURE_SHUFFLE_RELATIVE_BIT},
+    {67, "clustered subgroup operations", nullptr, VK_SUBGROUP_FEATURE_CLUSTERED_BIT},
+    {68, "subgroup operations on quads", nullptr, VK_SUBGROUP_FEATURE_QUAD_BIT},
+    {4433, "storageBuffer16BitAccess", DARB_FEATURE(v11.storageBuffer16BitAccess)},
+    {4448, "storageBuffer8BitAccess", DARB_FEATURE(v12.storageBuffer8BitAccess)},
+    {5345, "vulkanMemoryModel", DARB_FEATURE(v12.vulkanMemoryModel)},
+    {5346, "vulkanMemoryModelDeviceScope", DARB_FEATURE(v12.vulkanMemoryModelDeviceScope)},
+    {5347, "bufferDeviceAddress", DARB_FEATURE(v12.bufferDeviceAddress)},
+};
+
+// What no capability says.
+struct OwnFeature {
+    const char* name;
+    const char* who;
+    Feature feature;
+};
+const OwnFeature kOwnFeatures[] = {
+    {"scalarBlockLayout", "the arguments and buffers of all shaders need",
+     DARB_FEATURE(v12.scalarBlockLayout)},
+    {"synchronization2", "all barriers need", DARB_FEATURE(v13.synchronization2)},
+    {"subgroupSizeControl", "shaders with subgroup operations need",
+     DARB_FEATURE(v13.subgroupSizeControl)},
+    {"computeFullSubgroups", "shaders with subgroup operations need",
+     DARB_FEATURE(v13.computeFullSubgroups)},
+};
+#undef DARB_FEATURE
+
+const Capability* find_capability(std::uint32_t number) {
+    const auto found = std::find_if(std::begin(kCapabilities), std::end(kCapabilities),
+                                    [&](const Capability& c) { return c.number == number; });
+    return found == std::end(kCapabilities) ? nullptr : found;
+}
+
+}  // namespace
+
+DeviceFeatures::DeviceFeatures() {
+    core.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+    v11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES;
+    v12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
+    v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES;
+    core.pNext = &v11;
+    v11.pNext = &v12;
+    v12.pNext = &v13;
+}
+
+std::vector<ShaderNeed> shader_needs(std::span<const ShaderBinary> shaders) {
+    std::map<std::uint32_t, std::string> first;
+    for (const ShaderBinary& shader : shaders)
+        for (const std::uint32_t number : reflect_spirv(shader.words, shader.name).capabilities) {
+            DARB_CHECK(find_capability(number) != nullptr,
+                       "shader {} asks for the capability {} of SPIR-V, for which "
+                       "engine/gpu/device.cpp has no row",
+                       shader.name, number);
+            first.emplace(number, shader.name);
+        }
+    std::vector<ShaderNeed> needs;
+    for (const auto& [number, shader] : first) needs.push_back({number, shader});
+    return needs;
+}
+
+const std::vector<ShaderNeed>& needs_of_all_shaders() {
+    static const std::vector<ShaderNeed> needs = shader_needs(shader_table());
+    return needs;
+}
+
+void want_features(const std::vector<ShaderNeed>& needs, DeviceFeatures& wanted) {
+    for (const OwnFeature& own : kOwnFeatures) own.feature(wanted) = VK_TRUE;
+    for (const ShaderNeed& need : needs)
+        if (const Capability& c = *find_capability(need.capability); c.feature != nullptr)
+            c.feature(wanted) = VK_TRUE;
+}
+
+std::string missing_feature(const std::vector<ShaderNeed>& needs, DeviceFeatures& offered,
+                            VkSubgroupFeatureFlags subgroup_operations) {
+    for (const OwnFeature& own : kOwnFeatures)
+        if (!own.feature(offered)) return fmt::format("no {}, which {}", own.name, own.who);
+    for (const ShaderNeed& need : needs) {
+        const Capability& c = *find_capability(need.capability);
+        const bool offers = (c.feature == nullptr || c.feature(offered)) &&
+                            (c.operations & ~subgroup_operations) == 0;
+        if (!offers) return fmt::format("no {}, which shader {} needs", c.name, need.shader);
+    }
+    return {};
 }
 
 }  // namespace darb

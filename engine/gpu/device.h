@@ -8,11 +8,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "engine/gpu/faults.h"
 #include "engine/gpu/pipeline_statistics.h"
+#include "engine/gpu/shader_table.h"
 
 namespace darb {
 
@@ -195,5 +197,50 @@ class Device {
 /// Throws an error that names WHAT for every result but VK_SUCCESS: NoRoom where memory ran out,
 /// DeviceLost, or Error.
 void check_vulkan(VkResult result, const std::string& what);
+
+// The device of a command: what --device says, and the environment: DARB_VALIDATION=1 turns the
+// validation layers on, DARB_FAULT injects faults for tests (engine/gpu/faults.h), compiled shaders
+// are kept in the user's cache folder.
+
+/// Sets MESA_SHADER_CACHE_DIR where nothing has set it. Throws Error where DARB_FAULT names no
+/// fault.
+DeviceOptions command_device(const std::string& select);
+
+// What the shaders of the table need of a device, read from the capabilities of their SPIR-V: so
+// that a device is asked for no more, and one that is refused learns which shader it fails. Private
+// to engine/gpu.
+
+/// The chain that the query of a device and vkCreateDevice share.
+struct DeviceFeatures {
+    VkPhysicalDeviceFeatures2 core{};
+    VkPhysicalDeviceVulkan11Features v11{};
+    VkPhysicalDeviceVulkan12Features v12{};
+    VkPhysicalDeviceVulkan13Features v13{};
+
+    DeviceFeatures();
+    DeviceFeatures(const DeviceFeatures&) = delete;
+    DeviceFeatures& operator=(const DeviceFeatures&) = delete;
+};
+
+/// A capability of SPIR-V and the first shader that asks for it.
+struct ShaderNeed {
+    std::uint32_t capability = 0;
+    std::string shader;
+};
+
+/// Each capability once, in order of its number. Aborts on one that this file does not know, as no
+/// device could be held to it.
+std::vector<ShaderNeed> shader_needs(std::span<const ShaderBinary> shaders);
+/// The needs of all shaders in the embedded table, which is read once per process.
+const std::vector<ShaderNeed>& needs_of_all_shaders();
+
+/// Turns on what these needs and this project's own Vulkan calls take, nothing else: robust access,
+/// for one, would cost time.
+void want_features(const std::vector<ShaderNeed>& needs, DeviceFeatures& wanted);
+
+/// What is missing first, and who needs it ("no shaderInt64, which shader x needs"); "" where a
+/// device offers all.
+std::string missing_feature(const std::vector<ShaderNeed>& needs, DeviceFeatures& offered,
+                            VkSubgroupFeatureFlags subgroup_operations);
 
 }  // namespace darb

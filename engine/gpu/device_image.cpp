@@ -5,7 +5,6 @@
 
 #include <utility>
 
-#include "engine/gpu/device_memory.h"
 #include "engine/gpu/device_state.h"
 
 namespace darb {

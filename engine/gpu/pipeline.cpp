@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "engine/gpu/pipeline.h"
+#include "engine/gpu/shader_table.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <bit>
 #include <chrono>
@@ -10,7 +10,6 @@
 
 #include "engine/core/error.h"
 #include "engine/gpu/device_state.h"
-#include "engine/gpu/shader_table.h"
 #include "engine/gpu/spirv_reflect.h"
 
 namespace darb {

@@ -2,24 +2,44 @@
 // Pipeline: one compute shader of the table with its specialization constants set by name.
 #pragma once
 
+#include <darb_constant_names.h>
 #include <vulkan/vulkan.h>
-
 #include <compare>
 #include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
-#include "engine/gpu/constant_name.h"
 #include "engine/gpu/device.h"
 
 namespace darb {
+
+/// The name of a specialization constant that a shader declares. Made of a literal, which is
+/// checked while compiling.
+class ConstantName {
+  public:
+    template <std::size_t n>
+    consteval ConstantName(const char (&name)[n])
+        : text_(declared(std::string_view(name, n - 1))) {}  // implicit, as SpecValue
+    constexpr std::string_view text() const { return text_; }
+    auto operator<=>(const ConstantName&) const = default;
+
+  private:
+    static consteval std::string_view declared(std::string_view name) {
+        for (const std::string_view known : kConstantNames)
+            if (known == name) return known;
+        throw "no shader declares a specialization constant of this name";
+    }
+    std::string_view text_;
+};
 
 /// The value of a specialization constant. Integers also set bool and uint constants.
 struct SpecValue {

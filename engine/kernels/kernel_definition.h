@@ -4,7 +4,9 @@
 // family of kernels.
 #pragma once
 
+#include <filesystem>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -60,5 +62,47 @@ void check_definition(const KernelDefinition& definition);
 std::string fault_of_kernel_name(std::string_view name);
 /// The table row of a checked definition; its name is a view of definition.name.
 KernelProfile profile_of(const KernelDefinition& definition);
+
+// Kernels as people write them: a name, an expression, a file of their own.
+
+/// A kernel by its name or as "expr: ...", which is registered; its notes are added to `notes`.
+/// Throws Error that names `option` for what is no kernel, and for a name with more than one pulse.
+int kernel_of_word(const std::string& option, const std::string& word,
+                   std::vector<std::string>& notes);
+
+/// The same for a word after --kernel, which must name one kernel alone.
+int kernel_of_option(const std::string& word, std::vector<std::string>& notes);
+
+/// Registers the kernels of a file, in its order. Throws Error that names the file.
+std::vector<int> kernels_of_file(const std::filesystem::path& path,
+                                 std::vector<std::string>& notes);
+
+/// The names that --kernel takes, with commas: built in, read from files, with shapes.
+std::string kernel_names();
+/// Those whose shape each splat learns.
+std::string shaped_kernel_names();
+
+// Kernels in JSON files: {"name": ..., "support": ..., "expression": ...} or "table": [[q, w], ...]
+// or "function": ..., or a list of these. "function" is what darb writes: a kernel in digested
+// form, which needs neither expression nor table.
+
+constexpr std::size_t kMostTableRows = 10'000, kMostKernelsOfFile = 100;
+
+/// Makes a kernel from a table with q rising from 0 and w falling from its first value. In between
+/// it is the cubic spline or, where that would grow, the monotone cubics of Fritsch and Carlson.
+/// The support is the last q. Throws Error naming the row, counted from 1.
+KernelDefinition kernel_from_table(std::string_view name,
+                                   const std::vector<std::pair<double, double>>& rows,
+                                   const std::string& where);
+
+/// Throws Error naming the file and, where known, the row or the place in an expression. A single
+/// kernel without a name takes that of the file.
+std::vector<KernelDefinition> parse_kernel_file(std::string_view text, const std::string& where);
+std::vector<KernelDefinition> read_kernel_file(const std::filesystem::path& path);
+
+/// To and from the form of "function", which preserves same_kernel() and source.
+/// definition_from_json throws Error at `where`.
+nlohmann::json definition_json(const KernelDefinition& definition);
+KernelDefinition definition_from_json(const nlohmann::json& json, const std::string& where);
 
 }  // namespace darb

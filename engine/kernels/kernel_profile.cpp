@@ -2,7 +2,6 @@
 #include "engine/kernels/kernel_profile.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +9,7 @@
 #include <numbers>
 
 #include "engine/core/error.h"
-#include "engine/kernels/quadrature.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb {
 namespace {
@@ -306,6 +305,98 @@ double DerivedKernel::radius_quantile(double u) const {
         r = next > low && next < high ? next : (low + high) / 2;
     }
     return r;
+}
+
+// With area element dq (up to pi), I = integral w e^(-q/2c) dq and J = integral w q e^(-q/2c) dq:
+//   |w - a e^(-q/2c)|^2 = integral w^2 - 2 a I + a^2 c, least over c where a c^2 = J, and over both
+// where a = I/c, so c I = J.
+
+GaussianEquivalent gaussian_equivalent_of(const std::function<double(double)>& profile,
+                                          double support, double scale, bool keep_opacity) {
+    // u = s^2 makes half powers of u analytic; dq is 2 R^2 s ds.
+    const auto integral = [&](auto f) {
+        return 2 * support * integrate_unit([&](double s) {
+                   const double q = support * (1 - s * s);
+                   return s * f(q, profile(q));
+               });
+    };
+    const auto overlap = [&](double c) {
+        return integral([&](double q, double w) { return w * std::exp(-q / (2 * c)); });
+    };
+    const auto excess = [&](double c) {  // has the sign of c minus the root, and rises through 0
+                                         // there
+        const double j =
+            integral([&](double q, double w) { return w * q * std::exp(-q / (2 * c)); });
+        return (keep_opacity ? c * c : c * overlap(c)) - j;
+    };
+    double low = 1e-3 * support, high = 10 * support;
+    for (int step = 0; step < 60; ++step) {
+        const double middle = (low + high) / 2;
+        (excess(middle) < 0 ? low : high) = middle;
+    }
+    const double square = integral([](double, double w) { return w * w; });
+    const double a = keep_opacity ? 1 : overlap(high) / high;
+    const double rest = square - 2 * a * overlap(high) + a * a * high;
+    return {high * scale, a, std::sqrt(rest / square)};
+}
+
+GaussianEquivalent gaussian_equivalent(int kernel, Footprint footprint, bool keep_opacity) {
+    const double support = kernel_support(kernel), scale = covariance_scale(kernel, footprint);
+    if (!std::isfinite(support)) return {scale, 1, 0};
+    return gaussian_equivalent_of([&](double q) { return kernel_value(kernel, footprint, q); },
+                                  support, scale, keep_opacity);
+}
+
+namespace {
+
+constexpr int kPoints = 64;
+
+std::array<QuadraturePoint, kPoints / 2> gauss_legendre() {
+    std::array<QuadraturePoint, kPoints / 2> rule{};
+    for (int i = 0; i < kPoints / 2; ++i) {
+        // Newton from Tricomi's estimate of the i-th root of the Legendre polynomial.
+        long double x = std::cos(std::numbers::pi_v<long double> * (i + 0.75L) / (kPoints + 0.5L));
+        long double derivative = 0;
+        for (int step = 0; step < 20; ++step) {
+            long double previous = 1, current = x;
+            for (int n = 2; n <= kPoints; ++n) {
+                const long double next = ((2 * n - 1) * x * current - (n - 1) * previous) / n;
+                previous = current;
+                current = next;
+            }
+            derivative = kPoints * (previous - x * current) / (1 - x * x);
+            x -= current / derivative;
+        }
+        const long double weight = 2 / ((1 - x * x) * derivative * derivative);
+        rule[static_cast<std::size_t>(i)] = {static_cast<double>(x), static_cast<double>(weight)};
+    }
+    return rule;
+}
+
+}  // namespace
+
+std::span<const QuadraturePoint> even_quadrature() {
+    static const auto rule = gauss_legendre();
+    return rule;
+}
+
+// With q = r^2 the area element is pi dq, and the moment per axis is half of that of q. As in
+// equal_area_scale, q = end (1 - s^2) makes half powers at the edge analytic.
+double rendered_second_moment(int kernel, Footprint footprint) {
+    if (blend_parts(kernel)) {
+        const ShapedKernel& blend = blend_kernel(kernel);
+        return blend.second_moment(footprint, blend.exponent(footprint, 0));
+    }
+    const DerivedKernel& k = derived_kernel(kernel);
+    if (!std::isfinite(k.row().support)) return 1;
+    const double end = k.pulses().front().end;
+    const auto integral = [&](int power) {
+        return integrate_unit([&](double s) {
+            const double q = end * (1 - s * s);
+            return 2 * end * s * (power == 1 ? q : 1) * k.value(footprint, q);
+        });
+    };
+    return k.covariance_scale(footprint) * integral(1) / integral(0) / 2;
 }
 
 }  // namespace darb

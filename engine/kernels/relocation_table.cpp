@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "engine/core/error.h"
-#include "engine/kernels/quadrature.h"
+#include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "shaders/shared/kernel_forms.h"
 

@@ -14,8 +14,6 @@
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_coefficients.h"
 #include "engine/kernels/kernel_profile.h"
-#include "engine/kernels/quadrature.h"
-#include "engine/kernels/second_moment.h"
 #include "shaders/shared/kernel_forms.h"
 
 namespace darb {

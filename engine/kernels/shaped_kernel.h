@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/kernels/gaussian_equivalent.h"
 #include "engine/kernels/kernel_family.h"
+#include "engine/kernels/kernel_profile.h"
 
 namespace darb {
 

@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-#include "engine/gpu/buffer_list.h"
+#include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
 

@@ -16,7 +16,7 @@
 #include "engine/core/text.h"
 #include "engine/data/camera_list.h"
 #include "engine/gpu/pipeline.h"
-#include "engine/kernels/second_moment.h"
+#include "engine/kernels/kernel_profile.h"
 #include "engine/publish/page_files.h"
 #include "engine/raster/forward_options.h"
 #include "engine/raster/kernel_constants.h"

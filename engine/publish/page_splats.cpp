@@ -11,7 +11,6 @@
 
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_profile.h"
-#include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/sh_basis.h"

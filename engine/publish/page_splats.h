@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The splats of a web page: columns of integers or of float32, which the page's script
-// (page/1_decode.js) turns back into values. For the order, see engine/scene/chunk_order.h.
+// (page/1_decode.js) turns back into values. For the order, see engine/scene/quantise.h.
 #pragma once
 
 #include <cstddef>

@@ -10,14 +10,14 @@
 #include "engine/core/error.h"
 #include "engine/core/text.h"
 #include "engine/data/camera_list.h"
-#include "engine/data/compare_view.h"
 #include "engine/data/image_io.h"
+#include "engine/data/metrics.h"
 #include "engine/publish/page_document.h"
 #include "engine/publish/page_splats.h"
 #include "engine/render/renderer.h"
 #include "engine/report/html.h"
-#include "engine/scene/orbit_cameras.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/splat_model.h"
 #include "engine/scene/subject.h"
 
 namespace darb {

@@ -3,7 +3,7 @@
 // the device's tuning says; recorded after Forward::record of the same frame.
 #pragma once
 
-#include "engine/gpu/buffer_list.h"
+#include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/raster/forward_options.h"
 #include "engine/raster/frame.h"

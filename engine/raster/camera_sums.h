@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "engine/gpu/buffer_list.h"
+#include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
 #include "shaders/shared/optim_args.h"

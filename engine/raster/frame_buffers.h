@@ -5,7 +5,7 @@
 
 #include <functional>
 
-#include "engine/gpu/buffer_list.h"
+#include "engine/gpu/buffer.h"
 #include "engine/raster/forward_options.h"
 #include "engine/raster/frame.h"
 

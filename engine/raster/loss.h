@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 
-#include "engine/gpu/buffer_list.h"
+#include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/device.h"
 #include "engine/gpu/pipeline.h"

@@ -19,7 +19,7 @@
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/frame_view.h"
 #include "engine/render/renderer.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb {
 

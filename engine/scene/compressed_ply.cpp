@@ -12,12 +12,11 @@
 
 #include "engine/core/error.h"
 #include "engine/core/quantile.h"
-#include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/ply.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_format.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/kernels/kernel_profile.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
@@ -29,5 +30,14 @@ SplatModel parse_dot_splat(std::span<const std::byte> file, const std::string& w
 /// at most 1/510, of a quaternion's component 1/128 before normalisation. Harmonics above degree 0
 /// are left out.
 std::vector<std::byte> encode_dot_splat(const SplatModel& model);
+
+// Converts a scene with another kernel to Gaussians, for viewers that know only these.
+
+/// Replaces scales and opacities by those of the Gaussian nearest to the scene's kernel (least
+/// squares over the image plane; kernel_profile.h); everything else stays. Opacities are
+/// limited to 0.999. A Gaussian scene is returned unchanged. *fit: what was used; for a kernel with
+/// shapes, the means over the splats, weighted by opacity.
+SplatModel as_gaussians(const SplatModel& model, bool keep_opacity,
+                        GaussianEquivalent* fit = nullptr);
 
 }  // namespace darb

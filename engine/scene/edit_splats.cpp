@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "engine/core/error.h"
-#include "engine/scene/undrawn.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {

@@ -48,7 +48,7 @@ std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel
 bool has_only_finite(const SplatModel& model);
 /// Whether no parameter of this splat is NaN or infinite.
 bool is_finite(const SplatModel& model, std::size_t splat);
-/// Drops splats with a NaN or infinite parameter, after applying the rule of infinite_values.h.
+/// Drops splats with a NaN or infinite parameter, after applying the rule of splat_model.h.
 std::size_t drop_non_finite(SplatModel& model);
 /// Whether a splat's rotation has a positive length; splats without one are never drawn.
 bool has_rotation(const SplatModel& model, std::size_t splat);

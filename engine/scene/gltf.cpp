@@ -14,14 +14,13 @@
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
 #include "engine/core/text.h"
-#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/scene/dot_splat.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/gaussian_scene.h"
-#include "engine/scene/infinite_values.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb::gltf {
 

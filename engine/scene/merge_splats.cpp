@@ -22,12 +22,12 @@
 
 #include "engine/core/error.h"
 #include "engine/core/on_threads.h"
-#include "engine/kernels/second_moment.h"
+#include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/shaped_kernel.h"
-#include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/quantise.h"
 #include "engine/scene/sh_basis.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb {
 

@@ -15,7 +15,7 @@
 #include "engine/core/files.h"
 #include "engine/core/text.h"
 #include "engine/kernels/kernel_coefficients.h"
-#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/compressed_ply.h"
@@ -24,7 +24,7 @@
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/splat_format.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/limits.h"
 

@@ -27,7 +27,7 @@ struct PlyFacts {
 /// Reads properties by name, in any order and of any type; SH degree 0 to 4 (whose last band is
 /// left out); the dialects listed below; compressed PLY (compressed_ply.h); ascii and binary of
 /// both byte orders. Other elements are skipped. A splat with a NaN or infinite parameter is
-/// dropped, except as infinite_values.h says. Without header comments, a scene has the kernel
+/// dropped, except as splat_model.h says. Without header comments, a scene has the kernel
 /// gaussian, the footprint psi and the default render mode. Positions are stored as set_positions
 /// does. Throws Error naming file, record and reason.
 SplatModel read_ply(const std::filesystem::path& path);
@@ -49,8 +49,8 @@ std::vector<std::byte> encode_ply(const SplatModel& model);
 // The header comments of splat PLY files, plain and compressed: SplatKernel, SplatFootprint and
 // SplatRenderMode (default or mip; Postshot writes "antialiased 0" or 1). The last comment of a
 // kind counts; keys and render modes are read in any case. A user's own kernel also has
-// SplatKernelFunction, the "function" of engine/kernels/kernel_file.h, and SplatKernelPolynomial
-// for other programs.
+// SplatKernelFunction, the "function" of engine/kernels/kernel_definition.h, and
+// SplatKernelPolynomial for other programs.
 
 /// Throws Error for an unknown kernel or footprint; registers a kernel that the comments define.
 /// notes: receives what comments ask for but is not supported.

@@ -11,9 +11,10 @@
 #include <cstring>
 #include <limits>
 #include <span>
+#include <vector>
 
-#include "engine/scene/infinite_values.h"
 #include "engine/scene/sh_basis.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb {
 
@@ -102,5 +103,13 @@ inline float half_to_float(std::uint16_t bits) {
     return static_cast<float>(exponent ? sign * std::ldexp(1024 + mantissa, exponent - 25)
                                        : sign * std::ldexp(mantissa, -24));
 }
+
+// The order of splats in a file in which chunks of consecutive splats share their bounds
+// (compressed_ply.h): splats of a chunk lie close together. It is the Morton order with 10 bits per
+// axis that splat-transform uses, so that its files keep their chunks when they are written again.
+// Splats far off, which would coarsen other splats' chunks, come last.
+
+/// model: finite positions; chunk: number of splats in one.
+std::vector<std::uint32_t> chunk_order(const SplatModel& model, std::size_t chunk);
 
 }  // namespace darb

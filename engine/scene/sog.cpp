@@ -29,14 +29,13 @@
 #include "engine/core/json_text.h"
 #include "engine/core/quantile.h"
 #include "engine/core/text.h"
-#include "engine/scene/chunk_order.h"
 #include "engine/scene/cluster_rows.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/splat_format.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb {
 

@@ -12,10 +12,20 @@
 #include <vector>
 
 #include "engine/kernels/kernel_family.h"
-#include "engine/scene/infinite_values.h"
 #include "shaders/shared/attribute_list.h"
+#include "shaders/shared/limits.h"
 
 namespace darb {
+
+inline float limit_infinite_logit(float logit) {
+    return std::isinf(logit) ? std::copysign(static_cast<float>(OPACITY_LOGIT_LIMIT), logit)
+                             : logit;
+}
+
+inline float limit_infinite_log_scale(float log_scale) {
+    return std::isinf(log_scale) && log_scale < 0 ? -static_cast<float>(LOG_SCALE_LIMIT)
+                                                  : log_scale;
+}
 
 enum Attribute {
     kPosition = ATTRIBUTE_POSITION,
@@ -147,5 +157,29 @@ struct SplatModel : SplatArrays<float> {
 inline double sigmoid(double logit) {
     return 1 / (1 + std::exp(-logit));
 }
+
+// Which splats are too transparent to be drawn by anybody.
+
+/// The opacity (of the sigmoid, 0 to 1) below which a splat is never drawn, where `cutoff` is the
+/// least alpha that is blended. It is lower by more than an opacity in float32 may be off, which is
+/// about 1e-6 of it.
+constexpr double undrawn_below(double cutoff) {
+    return cutoff * (1 - 1e-4);
+}
+
+// The contract of SplatModel's arrays.
+
+/// Throws Error where the degree or the length of an array is wrong, or the kernel needs shapes and
+/// the splats have none.
+void check_splat_shapes(const SplatModel& model);
+
+/// Whether splats of this kernel have an attribute: optional ones depend on the kernel.
+bool kernel_takes(int kernel, int attribute);
+/// Sets the kernel. Where it takes shapes, splats without one get 0, the start value; where it does
+/// not, shapes are removed.
+void set_kernel(SplatModel& model, int kernel);
+/// The same for a scene that was read: adds a note where its kernel takes shapes but the file has
+/// none.
+void settle_shapes(SplatModel& model, std::vector<std::string>& notes);
 
 }  // namespace darb

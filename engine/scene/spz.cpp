@@ -13,7 +13,7 @@
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_format.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {

@@ -14,8 +14,8 @@
 #include "engine/core/error.h"
 #include "engine/core/quantile.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/infinite_values.h"
 #include "engine/scene/quantise.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {

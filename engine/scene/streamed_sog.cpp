@@ -17,7 +17,6 @@
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
 #include "engine/core/text.h"
-#include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/merge_splats.h"

@@ -8,8 +8,8 @@
 
 #include "engine/core/on_threads.h"
 #include "engine/core/quantile.h"
-#include "engine/data/region.h"
-#include "engine/data/resample.h"
+#include "engine/data/dataset.h"
+#include "engine/data/image_io.h"
 #include "engine/gpu/commands.h"
 #include "engine/primitives/groups.h"
 
@@ -98,7 +98,7 @@ void set_range_of_points(const Points& points, StereoPhoto& photo) {
     photo.far = kFarther * quantile(depth, 1 - kStray);
 }
 
-void set_range_of_region(const Region& region, StereoPhoto& photo) {
+void set_range_of_region(const WatchedBox& region, StereoPhoto& photo) {
     const double middle = to_camera(photo.camera, region.centre).z;
     const double half = glm::length(region.half);
     if (!(middle + half > 0)) return;
@@ -160,7 +160,7 @@ std::vector<StereoPhoto> stereo_photos(const Dataset& dataset, const std::vector
                                        const StereoOptions& options) {
     std::vector<StereoPhoto> chosen;
     std::vector<Points> shown;
-    const Region region = region_in_view(dataset);
+    const WatchedBox region = region_in_view(dataset);
     std::vector<Points> seen = points_of_views(dataset);
     for (size_t v = 0; v < dataset.views.size(); ++v) {
         const View& view = dataset.views[v];

@@ -9,7 +9,6 @@
 #include "engine/data/colmap.h"
 #include "engine/data/image_io.h"
 #include "engine/data/lens_model.h"
-#include "engine/data/resample.h"
 
 namespace {
 

@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "engine/core/error.h"
+#include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_expression.h"
-#include "engine/kernels/kernel_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const std::string_view text(reinterpret_cast<const char*>(data), size);

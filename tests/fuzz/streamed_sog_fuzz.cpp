@@ -11,7 +11,7 @@
 
 #include "engine/core/error.h"
 #include "engine/scene/splat_file.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 
 namespace {
 

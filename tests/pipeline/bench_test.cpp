@@ -10,11 +10,10 @@
 #include "engine/core/rng.h"
 #include "tests/support/run_command.h"
 #include "tests/support/shared_device.h"
+#include "tools/bench/cases.h"
 #include "tools/bench/growth.h"
 #include "tools/bench/measure.h"
 #include "tools/bench/native_blend.h"
-#include "tools/bench/native_sort.h"
-#include "tools/bench/scenes.h"
 #include "tools/bench/yardstick.h"
 
 namespace darb::test {

@@ -5,7 +5,6 @@
 #include "engine/data/image_io.h"
 #include "engine/data/lens_model.h"
 #include "engine/data/metrics.h"
-#include "engine/data/resample.h"
 #include "engine/kernels/kernel_coefficients.h"
 #include "engine/kernels/relocation_table.h"
 #include "engine/plan/accuracy.h"
@@ -26,7 +25,7 @@
 #include "tests/support/tiny_training.h"
 #include "trainer/options/option_table.h"
 #include "trainer/step/exposure.h"
-#include "trainer/step/iterate_average.h"
+#include "trainer/step/optimizer.h"
 #include "trainer/step/smoothing.h"
 
 namespace darb::test {

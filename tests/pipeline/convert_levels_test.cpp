@@ -16,7 +16,7 @@
 #include "tests/support/shared_device.h"
 #include "tests/support/splat_files.h"
 #include "tests/support/test_data.h"
-#include "tools/cost/views.h"
+#include "tools/cost/plan_subject.h"
 
 namespace darb::test {
 namespace {

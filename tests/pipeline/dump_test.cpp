@@ -6,8 +6,8 @@
 
 #include <cstring>
 
-#include "engine/check/check_report.h"
 #include "engine/check/dump.h"
+#include "engine/check/run_checks.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
 #include "engine/reference/reference_render.h"

@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "engine/core/files.h"
+#include "engine/gpu/pipeline.h"
 #include "engine/gpu/shader_table.h"
 
 namespace darb::test {

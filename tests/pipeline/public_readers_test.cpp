@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "engine/scene/dot_splat.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/gaussian_scene.h"
 #include "engine/scene/sog.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/ksplat_file.h"

@@ -9,7 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/raster/adam.h"
-#include "engine/reference/adam.h"
+#include "engine/reference/reference_density_control.h"
 #include "engine/render/render_gradients.h"
 #include "tests/support/compare_images.h"
 #include "tests/support/test_walk.h"

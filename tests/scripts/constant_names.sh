@@ -9,7 +9,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 compiles() { # NAME: a table with this constant
-    printf '#include "engine/gpu/constant_name.h"\nconstexpr darb::ConstantName kName = "%s";\n' "$1" >"$folder/name.cpp"
+    printf '#include "engine/gpu/pipeline.h"\nconstexpr darb::ConstantName kName = "%s";\n' "$1" >"$folder/name.cpp"
     "$compiler" -std=c++20 -fsyntax-only -I. -I"$build/generated/constants" "$folder/name.cpp" 2>"$folder/said"
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The Adam step inside project_backward.comp against Adam in double, and what it must not change.
-#include "engine/reference/adam.h"
+#include "engine/reference/reference_density_control.h"
 
 #include <algorithm>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // blend.comp and blend_records.comp alone against the blending of the reference, on splats set by
 // hand.
-#include "engine/plan/tuning_names.h"
+#include "engine/plan/tuner.h"
 #include "tests/support/blend_scene.h"
 #include "tests/support/compare_arrays.h"
 

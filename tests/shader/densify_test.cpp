@@ -9,7 +9,7 @@
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/backward.h"
 #include "engine/reference/reference_density_control.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "tests/support/every_kernel.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"

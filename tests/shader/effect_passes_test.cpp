@@ -2,7 +2,7 @@
 // The effects' own passes against double: exposure forward, backward and its step, the 3D smoothing
 // filter, and the depth image.
 #include "engine/core/rng.h"
-#include "engine/reference/adam.h"
+#include "engine/reference/reference_density_control.h"
 #include "engine/reference/reference_render.h"
 #include "engine/render/renderer.h"
 #include "tests/support/compare_arrays.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The mean of the splats over iterations: compared with one in double, and what it holds and
 // returns.
-#include "trainer/step/iterate_average.h"
+#include "trainer/step/optimizer.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The passes of the strategy mcmc against double precision, one by one and together; and the law
 // that they serve: a splat replaced by several looks as it did.
-#include "trainer/growth/relocation.h"
+#include "trainer/growth/mcmc.h"
 
 #include "engine/core/rng.h"
 #include "engine/kernels/relocation_table.h"
@@ -9,7 +9,7 @@
 #include "engine/primitives/groups.h"
 #include "engine/reference/reference_density_control.h"
 #include "engine/reference/reference_render.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/strategy_args.h"
 #include "tests/support/compare_arrays.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Splats in Morton order: against a stable sort on the host, with everything that belongs to a
 // splat, and the resulting picture.
-#include "trainer/growth/morton_order.h"
+#include "trainer/growth/density_control.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "engine/plan/tuning_names.h"
+#include "engine/plan/tuner.h"
 
 namespace darb::test {
 

@@ -2,7 +2,7 @@
 // Options for the device of tests: those of the command, so that both compile a shader only once.
 #pragma once
 
-#include "engine/gpu/device_environment.h"
+#include "engine/gpu/device.h"
 
 namespace darb::test {
 

@@ -2,7 +2,7 @@
 // Random scenes, by their short names in tests.
 #pragma once
 
-#include "engine/reference/random_scene.h"
+#include "engine/reference/splats.h"
 
 namespace darb::test {
 

@@ -10,7 +10,7 @@
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
 #include "trainer/growth/initial_model.h"
-#include "trainer/run/evaluation.h"
+#include "trainer/run/run_report.h"
 #include "trainer/step/trainer.h"
 
 namespace darb::test {

@@ -6,7 +6,7 @@
 
 #include "engine/core/rng.h"
 #include "engine/data/track_adjustment.h"
-#include "engine/reference/random_scene.h"
+#include "engine/reference/splats.h"
 #include "engine/scene/pose_metric.h"
 
 namespace darb::test {

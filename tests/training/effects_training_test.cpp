@@ -7,7 +7,7 @@
 #include "tests/support/same_rounding.h"
 #include "tests/support/test_device_options.h"
 #include "tests/support/tiny_training.h"
-#include "trainer/run/follow_run.h"
+#include "trainer/run/run.h"
 
 namespace darb::test {
 namespace {

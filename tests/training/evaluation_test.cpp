@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // How a render is compared with a photo: alpha as transparency, and alpha as a mask.
-#include "trainer/run/evaluation.h"
+#include "trainer/run/run_report.h"
 
 #include <gtest/gtest.h>
 

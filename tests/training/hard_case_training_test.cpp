@@ -4,7 +4,7 @@
 // everything finite.
 #include "engine/check/device_walk.h"
 #include "engine/check/hard_cases.h"
-#include "engine/reference/adam.h"
+#include "engine/reference/reference_density_control.h"
 #include "engine/reference/reference_loss.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/tiny_training.h"

@@ -8,7 +8,7 @@
 
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/ply.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "tests/support/every_kernel.h"
 #include "tests/support/resumed_run.h"
 

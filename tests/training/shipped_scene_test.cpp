@@ -7,7 +7,7 @@
 #include "trainer/growth/initial_model.h"
 #include "trainer/growth/predicted_growth.h"
 #include "trainer/options/strategy.h"
-#include "trainer/run/evaluation.h"
+#include "trainer/run/run_report.h"
 #include "trainer/step/trainer.h"
 
 namespace darb::test {

@@ -2,10 +2,9 @@
 #include "tools/bench/bench_report.h"
 
 #include <fmt/format.h>
-
 #include <cmath>
 
-#include "engine/plan/tuning_names.h"
+#include "engine/plan/tuner.h"
 #include "tools/bench/native_blend.h"
 
 namespace darb {

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 
 #include "engine/gpu/device.h"
 #include "tools/bench/measure.h"
@@ -22,5 +23,10 @@ std::string context_text(const nlohmann::json& context);
 /// details: below the case's line, add one line per pass and yardstick.
 std::string result_text(const BenchResult& result, const DeviceRates& rates, bool details);
 nlohmann::json result_json(const BenchResult& result, const DeviceRates& rates);
+
+// The commit that the program was built from.
+
+/// Abbreviated hash, with "-dirty" where tracked files differed from it; "unknown" outside of git.
+std::string_view build_commit();
 
 }  // namespace darb

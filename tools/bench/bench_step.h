@@ -65,7 +65,7 @@ struct PassStatistics {
     double splats = 0, pixels = 0, intersections = 0;
 };
 
-/// Compiles every choice that the device has for each pass (engine/plan/tuning_names.h), the usual
+/// Compiles every choice that the device has for each pass (engine/plan/tuner.h), the usual
 /// ones first. Throws Error as Device does.
 PassStatistics compile_every_pass(const std::string& select);
 

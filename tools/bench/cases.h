@@ -11,6 +11,7 @@
 #include "engine/core/image.h"
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
+#include "engine/scene/splat_model.h"
 #include "tools/bench/measure.h"
 #include "trainer/options/options.h"
 
@@ -42,7 +43,7 @@ std::vector<BenchCase> train_cases(bool full);
 std::vector<BenchCase> step_cases();
 /// Radix sort and scan.
 std::vector<BenchCase> sort_cases();
-/// One row for each choice of the passes that have several (engine/plan/tuning_names.h).
+/// One row for each choice of the passes that have several (engine/plan/tuner.h).
 std::vector<BenchCase> tuning_cases();
 /// The first picture of a new process, with shaders compiled or from the driver's cache.
 std::vector<BenchCase> start_cases();
@@ -64,5 +65,27 @@ BenchResult measure_frames(Device& device, const SplatModel& model, const Camera
 /// Measures steps of a trainer that has been set up; without figures on blending.
 class Trainer;
 BenchResult measure_steps(Trainer& trainer, int steps_a_sample, const Sampling& sampling);
+
+// The scenes that `darb bench` measures on.
+
+/// Splats uniform in the unit sphere, log-scales N(log 0.01, 0.4), opacity logits N(0, 1.5), higher
+/// coefficients N(0, 0.05), coloured by position; identical at every call.
+SplatModel random_scene(std::size_t splats, int sh_degree = 3);
+
+/// Splats of degree 3 that fill the picture of bench_camera({0, 0, 4}, true, 1000, 1000), at
+/// distances between 3 and 5, with six tiles each; most of them faint, as in a trained scene.
+SplatModel filled_scene(std::size_t splats);
+
+/// A camera at `centre` that looks along -z, with y up where `upright`, else turned 180 degrees
+/// about z, for scenes with y down. Its horizontal field of view is 45 degrees.
+Camera bench_camera(const glm::dvec3& centre, bool upright, int width, int height);
+
+/// A view without a photo, with the camera's pinhole as its lens.
+View bench_view(const Camera& camera, const std::string& name);
+
+/// The folder of photos and trained scenes: `named`, or else the usual one; nothing where that does
+/// not exist. Throws Error where the named one is missing.
+std::optional<std::filesystem::path> bench_data_folder(const std::filesystem::path& named,
+                                                       const std::filesystem::path& usual);
 
 }  // namespace darb

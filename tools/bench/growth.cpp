@@ -12,7 +12,6 @@
 #include "engine/report/html.h"
 #include "engine/report/svg_plot.h"
 #include "tools/bench/cases.h"
-#include "tools/bench/scenes.h"
 #include "trainer/step/trainer.h"
 
 namespace darb {

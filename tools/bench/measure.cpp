@@ -14,7 +14,7 @@
 #include <fstream>
 #include <thread>
 
-#include "tools/bench/commit.h"
+#include "tools/bench/bench_report.h"
 
 namespace darb {
 

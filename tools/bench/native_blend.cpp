@@ -2,8 +2,10 @@
 #include "tools/bench/native_blend.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <numeric>
 #include <thread>
 
 #include "engine/core/error.h"
@@ -172,6 +174,31 @@ BlendCounts count_blend(const BlendFrame& frame) {
         for (std::uint32_t block = 0; block < kBlocks; ++block)
             baseline::forward_block<true>(frame, tile, block, hits, unused, counts);
     return counts;
+}
+
+void NativeSort::sort(std::vector<std::uint32_t>& keys, std::vector<std::uint32_t>& values) {
+    const std::size_t n = keys.size();
+    keys_.resize(n);
+    values_.resize(n);
+    std::array<std::array<std::uint32_t, 256>, 4> count{};  // counts all digits in one pass
+    for (const std::uint32_t key : keys)
+        for (std::size_t digit = 0; digit < 4; ++digit) ++count[digit][key >> (8 * digit) & 255u];
+    for (std::size_t digit = 0; digit < 4; ++digit) {
+        std::array<std::uint32_t, 256> next;
+        std::exclusive_scan(count[digit].begin(), count[digit].end(), next.begin(), 0u);
+        for (std::size_t i = 0; i < n; ++i) {
+            const std::uint32_t at = next[keys[i] >> (8 * digit) & 255u]++;
+            keys_[at] = keys[i];
+            values_[at] = values[i];
+        }
+        keys.swap(keys_);
+        values.swap(values_);
+    }
+}
+
+void native_scan(const std::vector<std::uint32_t>& counts, std::vector<std::uint32_t>& offsets) {
+    offsets.resize(counts.size());
+    std::exclusive_scan(counts.begin(), counts.end(), offsets.begin(), 0u);
 }
 
 }  // namespace darb

@@ -14,7 +14,7 @@
 #include "engine/plan/accuracy.h"
 #include "engine/reference/reference_render.h"
 #include "engine/render/renderer.h"
-#include "trainer/run/evaluation.h"
+#include "trainer/run/run_report.h"
 
 namespace darb {
 

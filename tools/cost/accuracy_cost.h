@@ -13,7 +13,7 @@
 #include "engine/plan/accuracy.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/splat_model.h"
-#include "tools/cost/views.h"
+#include "tools/cost/plan_subject.h"
 
 namespace darb {
 

@@ -17,7 +17,7 @@
 #include "trainer/growth/initial_model.h"
 #include "trainer/options/schedule.h"
 #include "trainer/options/strategy.h"
-#include "trainer/run/evaluation.h"
+#include "trainer/run/run_report.h"
 #include "trainer/step/checkpoint.h"
 #include "trainer/step/rank_group.h"
 #include "trainer/step/trainer.h"

@@ -14,7 +14,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "engine/core/text.h"
-#include "engine/gpu/device_environment.h"
+#include "engine/gpu/device.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/flags.h"
 #include "tools/darb/open_cameras.h"

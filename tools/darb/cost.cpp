@@ -10,7 +10,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "engine/data/dataset.h"
-#include "engine/gpu/device_environment.h"
+#include "engine/gpu/device.h"
 #include "engine/ranks/ranks.h"
 #include "engine/scene/stored_units.h"
 #include "tools/cost/cost_report.h"

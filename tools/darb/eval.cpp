@@ -18,7 +18,6 @@
 #include "engine/data/camera_list.h"
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "engine/gpu/device_environment.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/render/light_share.h"
 #include "engine/scene/splat_model.h"

@@ -16,7 +16,7 @@
 #include "engine/core/text.h"
 #include "engine/kernels/kernel_expression.h"
 #include "engine/kernels/kernel_family.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "trainer/job/request_options.h"
 
 namespace darb {

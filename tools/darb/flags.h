@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/data/dataset.h"
-#include "engine/kernels/kernel_words.h"
+#include "engine/kernels/kernel_definition.h"
 #include "engine/plan/accuracy.h"
 #include "engine/scene/splat_model.h"
 #include "engine/scene/stored_units.h"

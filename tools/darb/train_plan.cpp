@@ -9,7 +9,7 @@
 
 #include "engine/core/say.h"
 #include "engine/data/run_colmap.h"
-#include "engine/gpu/device_environment.h"
+#include "engine/gpu/device.h"
 #include "tools/darb/open_cameras.h"
 #include "trainer/job/request_options.h"
 #include "trainer/options/presets.h"

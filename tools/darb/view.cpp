@@ -23,7 +23,6 @@
 #include "engine/data/image_io.h"
 #include "engine/data/metrics.h"
 #include "engine/gpu/device.h"
-#include "engine/gpu/device_environment.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/plan/effect_plan.h"

@@ -3,18 +3,17 @@
 #include "tools/paper/compare_report.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
+#include "engine/data/image_io.h"
 #include "engine/kernels/kernel_family.h"
 #include "engine/report/html.h"
 #include "engine/report/svg_plot.h"
 #include "tools/paper/compare_runs.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
-#include "tools/paper/pictures.h"
 
 namespace darb {
 
@@ -539,6 +538,98 @@ std::vector<Crop> crops_of(const ComparedAt& first, const ComparedAt& second) {
     }
     if (!gain) return {};
     return {std::move(*gain), std::move(*loss)};
+}
+
+}  // namespace darb
+
+// NLOHMANN_DEFINE_TYPE looks for these by the type's namespace.
+namespace nlohmann {
+template <class T>
+struct adl_serializer<std::optional<T>> {
+    static void to_json(json& j, const std::optional<T>& value) {
+        j = value ? json::array({*value}) : json::array();
+    }
+    static void from_json(const json& j, std::optional<T>& value) {
+        value = j.empty() ? std::nullopt : std::optional<T>(j.at(0).get<T>());
+    }
+};
+}  // namespace nlohmann
+
+namespace darb {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedView, name, psnr_db, ssim, lpips, picture)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedScale, scale, psnr_db, ssim)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedAt, iteration, seconds, psnr_db, ssim, lpips, splats,
+                                   model_mb, model, views, scales, arc_db, off_path_db)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CurvePoint, iteration, seconds, loss, splats)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LearnedShapes, edges, shares, percentiles)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(BlendStatistics, blended_per_pixel, intersections_per_splat,
+                                   blend_ms, frame_ms, ns_per_splat_pixel)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedRun, kernel, seed, folder, failure, notes, exit_code, at,
+                                   curve, peak_mb, blending, shapes)
+
+Bytes bytes_of_runs(const std::vector<ComparedRun>& runs) {
+    const std::vector<std::uint8_t> cbor = nlohmann::json::to_cbor(runs);
+    const auto bytes = std::as_bytes(std::span(cbor));
+    return {bytes.begin(), bytes.end()};
+}
+
+std::vector<ComparedRun> runs_of_bytes(std::span<const std::byte> bytes) {
+    const auto* const first = reinterpret_cast<const std::uint8_t*>(bytes.data());
+    return nlohmann::json::from_cbor(first, first + bytes.size());
+}
+
+std::vector<ComparedRun> runs_of_all(Ranks& ranks, const std::vector<ComparedRun>& own,
+                                     std::size_t items) {
+    std::vector<std::vector<ComparedRun>> of_rank;
+    for (const Bytes& bytes : ranks.gather(bytes_of_runs(own)))
+        of_rank.push_back(runs_of_bytes(bytes));
+    std::vector<ComparedRun> runs;
+    for (std::size_t i = 0; i < items; ++i) {
+        std::vector<ComparedRun>& its = of_rank[turn_of(i, of_rank.size())];
+        const std::size_t at = i / of_rank.size();
+        if (at >= its.size()) continue;
+        runs.push_back(std::move(its[at]));
+    }
+    return runs;
+}
+
+namespace {
+
+std::uint8_t byte(double v) {
+    return static_cast<std::uint8_t>(std::clamp(v, 0.0, 1.0) * 255 + 0.5);
+}
+
+}  // namespace
+
+ImageU8 grey_field(int size, double white, const std::function<double(int, int)>& value) {
+    ImageU8 image(size, size, 1);
+    for (int y = 0; y < size; ++y)
+        for (int x = 0; x < size; ++x) image.at(x, y, 0) = byte(value(x, y) / white);
+    return image;
+}
+
+ImageU8 signed_field(int size, double limit, const std::function<double(int, int)>& value) {
+    ImageU8 image(size, size, 3);
+    for (int y = 0; y < size; ++y)
+        for (int x = 0; x < size; ++x) {
+            const double v = limit > 0 ? value(x, y) / limit : 0;
+            image.at(x, y, 0) = byte(1 + std::min(v, 0.0));
+            image.at(x, y, 1) = byte(1 - std::abs(v));
+            image.at(x, y, 2) = byte(1 - std::max(v, 0.0));
+        }
+    return image;
+}
+
+std::string html_pictures(const std::vector<Captioned>& pictures, int width_px) {
+    std::string html = "<div style='display:flex;flex-wrap:wrap;gap:.8rem'>";
+    for (const Captioned& one : pictures)
+        html += fmt::format(
+            "<figure style='margin:0;width:{0}px'><img alt='{1}' style='width:100%;"
+            "image-rendering:pixelated;border-radius:4px' src='data:image/png;base64,{2}'/>"
+            "<figcaption style='overflow-wrap:anywhere'>{1}</figcaption></figure>",
+            width_px, html_escape(one.caption), base64(encode_png(one.picture)));
+    return html + "</div>\n";
 }
 
 }  // namespace darb

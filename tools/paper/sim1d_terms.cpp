@@ -18,7 +18,7 @@ namespace darb {
 namespace {
 
 constexpr double kHalfRange = 10;
-constexpr double kGaussRadius = 13;  // e^-84 is below the least normal float
+constexpr double kGaussCut = 13;  // e^-84 is below the least normal float
 
 struct Coefficients {
     float c[KERNEL_MAX_DEGREE + 1];
@@ -238,7 +238,7 @@ bool Terms1d::draws(int kernel) {
 Terms1d::Terms1d(int kernel, std::span<const float> target, std::size_t primitives)
     : kernel_(kernel),
       coefficients_(coefficients_1d(kernel)),
-      radius_(std::min(kGaussRadius, std::sqrt(coefficients_.support))),
+      radius_(std::min(kGaussCut, std::sqrt(coefficients_.support))),
       target_(target),
       x_(sample_points_1d(static_cast<int>(target.size()))),
       residual_(target.size()),

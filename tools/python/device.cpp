@@ -3,7 +3,7 @@
 
 #include <unistd.h>
 
-#include "engine/gpu/device_environment.h"
+#include "engine/gpu/device.h"
 #include "engine/plan/tuner.h"
 
 namespace darb::python {

@@ -3,8 +3,8 @@
 // dict where Python's side has names and defaults for them; every mistake is darb.Error.
 #include <pybind11/pybind11.h>
 
-#include "engine/data/compare_view.h"
 #include "engine/data/image_io.h"
+#include "engine/data/metrics.h"
 #include "tools/python/dataset.h"
 #include "tools/python/device.h"
 #include "tools/python/kernel.h"

@@ -9,7 +9,7 @@
 
 #include "engine/kernels/kernel_family.h"
 #include "engine/scene/splat_file.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "tools/python/kernel.h"
 #include "tools/python/splat_arrays.h"
 

@@ -6,15 +6,15 @@
 #include <algorithm>
 #include <chrono>
 
-#include "engine/plan/tuning_names.h"
+#include "engine/plan/tuner.h"
 #include "engine/raster/frame_view.h"
 #include "engine/scene/edit_splats.h"
 #include "tools/python/scene.h"
 #include "tools/python/train_options.h"
 #include "trainer/options/schedule.h"
-#include "trainer/run/evaluation.h"
-#include "trainer/run/follow_run.h"
 #include "trainer/run/forecast.h"
+#include "trainer/run/run.h"
+#include "trainer/run/run_report.h"
 #include "trainer/step/checkpoint.h"
 
 namespace darb::python {

@@ -13,10 +13,10 @@
 
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
+#include "engine/data/dataset.h"
 #include "engine/data/image_io.h"
-#include "engine/data/region.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "trainer/options/schedule.h"
 
 namespace darb {
@@ -60,7 +60,7 @@ namespace {
 
 PointCloud random_points(const Dataset& dataset, const TrainOptions& options) {
     const std::uint64_t wanted = start_points(dataset, options);
-    const Region region = region_in_view(dataset);
+    const WatchedBox region = region_in_view(dataset);
     Pcg32 random(options.seed, 1);
     PointCloud cloud;
     for (std::uint64_t i = 0; i < wanted; ++i)

@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: MIT
 // Strategy mcmc: dead splats move onto live ones, the number grows by 5 % a round, positions get
 // noise. Source: 3DGS-MCMC, arXiv 2404.09591.
+#include "trainer/growth/mcmc.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "engine/core/rng.h"
+#include "engine/kernels/relocation_table.h"
+#include "engine/kernels/shaped_kernel.h"
+#include "engine/primitives/groups.h"
+#include "shaders/shared/kernel_forms.h"
+#include "shaders/shared/strategy_args.h"
+#include "trainer/growth/density_control.h"
 #include "trainer/growth/density_strategy.h"
-#include "trainer/growth/relocation.h"
 
 namespace darb {
 
@@ -85,6 +92,102 @@ const StrategyRow& mcmc_row() {
             return std::make_unique<Mcmc>(setup);
         }};
     return row;
+}
+
+namespace {
+
+// Integer weight of opacity 1 for this many splats: their sum fits 32 bits with some room for
+// float32's rounding.
+float weight_scale(std::uint32_t splats) {
+    return static_cast<float>(std::min(0.99 * 4'294'967'295.0 / splats, 16'777'216.0));
+}
+
+}  // namespace
+
+Relocation::Relocation(Device& device, int kernel, Footprint footprint)
+    : device_(&device), commands_(device) {
+    const SpecConstants threads{{"THREADS", SPLAT_GROUP}};
+    weight_ = Pipeline(device, "relocation_weight", threads);
+    draw_ = Pipeline(device, "relocation_draw", threads);
+    sources_ = Pipeline(device, "relocation_sources", threads);
+    SpecConstants relocate = shape_row_constants(kernel);
+    relocate["THREADS"] = SPLAT_GROUP;
+    relocate_ = Pipeline(device, "relocate", relocate);
+    noise_ = Pipeline(device, "position_noise", threads);
+    const std::vector<float> table =
+        relocation_table(kernel, footprint, RELOCATION_OPACITIES, RELOCATION_COUNTS);
+    table_ = Buffer(device, "relocation table", device_bytes(kernel));
+    table_.upload(table);
+}
+
+std::uint64_t Relocation::device_bytes(int kernel) {
+    const std::uint64_t row = std::uint64_t{RELOCATION_OPACITIES} * RELOCATION_COUNTS;
+    return row * (kernel_has_shape(kernel) ? SHAPE_ROWS : 1) * sizeof(float);
+}
+
+DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float dead_opacity,
+                              std::uint32_t grown, std::uint32_t seed) {
+    const std::uint32_t n = splats.count();
+    DensityResult result{n, n, 0, 0};
+    if (n == 0) return result;
+    Device& d = *device_;
+    const std::uint64_t bytes = std::uint64_t{n} * 4;
+    Buffer dead(d, "dead", bytes), weight(d, "weight", bytes), copies(d, "copies", bytes);
+    Buffer dead_offset(d, "dead offset", bytes), weight_offset(d, "weight offset", bytes);
+    Buffer count(d, "relocation count", 4), dead_total(d, "dead total", 4),
+        weight_total(d, "weight total", 4);
+    Scan scan(d, n);
+    const Groups g = groups_for(n);
+    gpu::RelocationArgs args{n, n, 0, 0, dead_opacity, weight_scale(n), seed};
+    commands_.begin();
+    commands_.pass("relocate");
+    commands_.fill(count, n);
+    commands_.dispatch(weight_, args, {splats.parameters(kOpacityLogit), dead, weight, copies}, g.x,
+                       g.y);
+    keep_frozen(commands_, splats.frozen(), {{&dead, 0}, {&weight, 0}});
+    scan.record(commands_, dead, dead_offset, count, 0, dead_total);
+    scan.record(commands_, weight, weight_offset, count, 0, weight_total);
+    commands_.submit_and_wait();
+
+    args.dead_count = dead_total.download<std::uint32_t>(1)[0];
+    args.weight_total = weight_total.download<std::uint32_t>(1)[0];
+    const std::uint32_t draws = args.dead_count + grown;
+    if (draws == 0 || args.weight_total == 0) return result;
+    args.splats_after = n + grown;
+    result = {n, args.splats_after, args.dead_count, grown};
+
+    Buffer drawn(d, "drawn", std::uint64_t{draws} * 4);
+    Buffer sources(d, "densify sources", std::uint64_t{args.splats_after} * 8);
+    const Groups each_draw = groups_for(draws), after = groups_for(args.splats_after);
+    commands_.begin();
+    commands_.pass("relocate");
+    commands_.dispatch(draw_, args, {weight_offset, drawn, copies}, each_draw.x, each_draw.y);
+    commands_.dispatch(sources_, args, {dead, dead_offset, drawn, copies, sources}, after.x,
+                       after.y);
+    commands_.submit_and_wait();
+    density.move(splats, sources, args.splats_after);
+    commands_.begin();
+    commands_.pass("relocate");
+    commands_.dispatch(relocate_, args,
+                       {sources, copies, table_, splats.parameters(kLogScale),
+                        splats.parameters(kOpacityLogit), splats.parameters(kShape)},
+                       after.x, after.y);
+    commands_.submit_and_wait();
+    return result;
+}
+
+void Relocation::record_noise(Commands& commands, GpuSplats& splats, const Buffer& status,
+                              float rate, float dead_opacity, std::uint32_t seed) {
+    const std::uint32_t n = splats.trained_count();
+    if (n == 0 || rate <= 0) return;
+    const Groups g = groups_for(n);
+    commands.pass("position noise");
+    commands.dispatch(noise_, gpu::NoiseArgs{n, seed, rate, dead_opacity},
+                      {splats.trained(splats.parameters(kPosition), 3),
+                       splats.trained(splats.parameters(kLogScale), 3),
+                       splats.trained(splats.parameters(kRotation), 4),
+                       splats.trained(splats.parameters(kOpacityLogit), 1), status},
+                      g.x, g.y);
 }
 
 }  // namespace darb

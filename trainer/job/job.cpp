@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "trainer/job/job.h"
 
-#include "engine/plan/tuning_names.h"
+#include "engine/plan/tuner.h"
 
 #include <fmt/format.h>
 

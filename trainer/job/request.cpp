@@ -10,9 +10,8 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_registry.h"
-#include "engine/kernels/kernel_words.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/plan/effect_plan.h"
 #include "trainer/job/request_options.h"

@@ -6,7 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
-#include "engine/kernels/kernel_words.h"
+#include "engine/kernels/kernel_definition.h"
 #include "engine/plan/effect_plan.h"
 #include "trainer/job/request_options.h"
 #include "trainer/options/presets.h"

@@ -2,7 +2,7 @@
 // The rows of option_table.h, in the order of `darb train --help-all`.
 #include <nlohmann/json.hpp>
 
-#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "trainer/options/option_table.h"

@@ -93,7 +93,7 @@ struct TrainOptions {
     // as many times the rate: what Adam reads and writes for them is most of what it moves.
     int sh_rest_every = 1;
     // From this share of the run on, once density control is over, the mean of the splats is taken,
-    // and the run ends with it; 1: never, as 3DGS. See iterate_average.h.
+    // and the run ends with it; 1: never, as 3DGS. See optimizer.h.
     double average_from = 0.85;
     // The position's rate falls for this share of the run and stays. Absent: for the whole, as
     // 3DGS, but where a mean settles what large steps scatter.

@@ -8,7 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
-#include "engine/scene/undrawn.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {

@@ -15,7 +15,7 @@
 #include "engine/core/text.h"
 #include "engine/data/image_io.h"
 #include "engine/data/run_events.h"
-#include "engine/plan/tuning_names.h"
+#include "engine/plan/tuner.h"
 #include "trainer/options/schedule.h"
 #include "trainer/options/strategy.h"
 #include "trainer/run/run_folder.h"

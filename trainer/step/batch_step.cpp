@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "trainer/step/batch_step.h"
+#include "trainer/step/rank_group.h"
 
 #include <fmt/format.h>
 #include <algorithm>

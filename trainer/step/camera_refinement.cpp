@@ -9,7 +9,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/quantile.h"
-#include "engine/data/compare_view.h"
+#include "engine/data/metrics.h"
 
 namespace darb {
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "trainer/step/checkpoint.h"
+#include "trainer/step/trainer_state.h"
 
 #include <zlib.h>
 
@@ -13,11 +14,11 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
-#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/raster/gpu_splats.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "trainer/options/option_table.h"
 #include "trainer/options/schedule.h"
 #include "trainer/options/strategy.h"

@@ -10,7 +10,7 @@
 
 #include "engine/data/dataset.h"
 #include "trainer/options/schedule.h"
-#include "trainer/step/gain_watch.h"
+#include "trainer/step/held_out_gain.h"
 #include "trainer/step/trainer_state.h"
 
 namespace darb {

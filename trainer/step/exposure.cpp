@@ -7,7 +7,7 @@
 #include <glm/glm.hpp>
 
 #include "engine/core/error.h"
-#include "engine/data/compare_view.h"
+#include "engine/data/metrics.h"
 #include "engine/primitives/groups.h"
 #include "shaders/shared/effect_args.h"
 #include "shaders/shared/render_args.h"

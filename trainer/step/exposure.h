@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/core/image.h"
-#include "engine/gpu/buffer_list.h"
+#include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
 #include "trainer/options/options.h"

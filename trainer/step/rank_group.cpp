@@ -10,7 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "engine/plan/tuning_names.h"
+#include "engine/plan/tuner.h"
 
 namespace darb {
 

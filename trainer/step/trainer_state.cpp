@@ -7,7 +7,7 @@
 #include <string>
 
 #include "engine/core/error.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb {
 

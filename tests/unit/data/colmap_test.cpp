@@ -12,12 +12,10 @@
 
 #include "engine/core/files.h"
 #include "engine/data/camera_list.h"
-#include "engine/data/colmap_write.h"
 #include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
 #include "engine/data/lens_model.h"
 #include "engine/data/point_cloud_ply.h"
-#include "engine/data/pose.h"
 #include "tests/unit/data/data_files.h"
 
 namespace darb {

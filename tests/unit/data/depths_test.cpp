@@ -8,10 +8,10 @@
 #include <map>
 
 #include "engine/core/files.h"
-#include "engine/data/colmap_write.h"
-#include "engine/data/compare_view.h"
+#include "engine/data/colmap.h"
 #include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
+#include "engine/data/metrics.h"
 #include "tests/unit/data/data_files.h"
 
 namespace darb {

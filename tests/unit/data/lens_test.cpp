@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "engine/core/files.h"
-#include "engine/data/resample.h"
+#include "engine/data/image_io.h"
 #include "tests/unit/data/data_files.h"
 
 namespace darb {

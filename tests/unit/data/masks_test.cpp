@@ -6,7 +6,7 @@
 
 #include "engine/core/files.h"
 #include "engine/data/camera_list.h"
-#include "engine/data/colmap_write.h"
+#include "engine/data/colmap.h"
 #include "engine/data/image_io.h"
 #include "tests/unit/data/data_files.h"
 

@@ -10,10 +10,9 @@
 
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
-#include "engine/data/colmap_write.h"
+#include "engine/data/colmap.h"
 #include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
-#include "engine/data/resample.h"
 #include "tests/unit/data/data_files.h"
 
 namespace darb {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Commands and Pipeline: fills, copies, dispatches, barriers under validation, timestamps.
 #include "engine/gpu/commands.h"
+#include "engine/gpu/shader_table.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/gpu/barriers.h"
-#include "engine/gpu/shader_table.h"
+#include "engine/gpu/pipeline.h"
 #include "engine/gpu/spirv_reflect.h"
 #include "shaders/shared/scan_args.h"
 #include "tests/support/test_device_options.h"

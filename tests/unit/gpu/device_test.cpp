@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Device: listing, selection, buffers, budgets and injected faults.
 #include "engine/gpu/device.h"
+#include "engine/gpu/shader_table.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -15,11 +16,9 @@
 #include "engine/core/error.h"
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
-#include "engine/gpu/device_memory.h"
 #include "engine/gpu/device_state.h"
 #include "engine/gpu/faults.h"
-#include "engine/gpu/shader_features.h"
-#include "engine/gpu/shader_table.h"
+#include "engine/gpu/pipeline.h"
 #include "tests/support/test_device_options.h"
 
 namespace darb {

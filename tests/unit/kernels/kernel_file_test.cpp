@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Kernels in JSON files and tables: what they give, and that no file causes a crash.
-#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_definition.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

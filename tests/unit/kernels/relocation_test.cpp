@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "engine/kernels/gaussian_equivalent.h"
+#include "engine/kernels/kernel_profile.h"
 #include "tests/support/footprints.h"
 #include "tests/support/kernel_formulas.h"
 #include "tests/support/tanh_sinh.h"

@@ -7,7 +7,6 @@
 #include "engine/kernels/kernel_expression.h"
 #include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/relocation_table.h"
-#include "engine/kernels/second_moment.h"
 #include "tests/support/every_kernel.h"
 #include "tests/support/footprints.h"
 

@@ -7,7 +7,6 @@
 
 #include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/relocation_table.h"
-#include "engine/kernels/second_moment.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "shaders/shared/kernel_forms.h"
 

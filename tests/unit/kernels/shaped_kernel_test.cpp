@@ -9,7 +9,6 @@
 
 #include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/relocation_table.h"
-#include "engine/kernels/second_moment.h"
 #include "shaders/shared/kernel_forms.h"
 #include "tests/support/footprints.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Runs of a comparison, sent between ranks.
-#include "tools/paper/compare_share.h"
+#include "tools/paper/compare_report.h"
 
 #include <gtest/gtest.h>
 

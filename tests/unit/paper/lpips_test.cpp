@@ -18,7 +18,7 @@
 #include "engine/core/rng.h"
 #include "engine/data/image_io.h"
 #include "engine/data/metrics.h"
-#include "tools/paper/compare_measure.h"
+#include "tools/paper/compare_runs.h"
 
 namespace darb {
 namespace {

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The correction factor: printed values, closed forms, and the paper's experiment.
-#include "tools/paper/psi_measure.h"
+#include "tools/paper/psi_report.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-
-#include "tools/paper/psi_report.h"
 
 namespace darb {
 namespace {

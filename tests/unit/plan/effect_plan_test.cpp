@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The effect plan: scenes and data sets made to need exactly one effect get exactly that one.
 #include "engine/plan/effect_plan.h"
-#include "engine/plan/antialias_probe.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // engine/plan/tuning_names, tuner: names, what a device allows, the record on disk,
 // what wins.
-#include "engine/plan/tuning_names.h"
+#include "engine/plan/tuner.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,6 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
-#include "engine/plan/tuner.h"
 #include "engine/primitives/radix_sort.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/shared_device.h"

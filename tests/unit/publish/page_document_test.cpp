@@ -11,7 +11,8 @@
 #include <regex>
 
 #include "engine/core/files.h"
-#include "engine/scene/orbit_cameras.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/subject.h"
 #include "shaders/shared/limits.h"
 #include "tests/support/splat_files.h"
 

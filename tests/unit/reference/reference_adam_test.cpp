@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Adam against its sums written out, and the hard cases of its first steps.
-#include "engine/reference/adam.h"
+#include "engine/reference/reference_density_control.h"
 
 #include <gtest/gtest.h>
 

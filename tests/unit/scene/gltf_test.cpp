@@ -9,8 +9,8 @@
 #include <numbers>
 
 #include "engine/core/files.h"
+#include "engine/scene/dot_splat.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/gaussian_scene.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/splat_files.h"
 

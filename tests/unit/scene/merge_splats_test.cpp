@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "engine/kernels/second_moment.h"
+#include "engine/kernels/kernel_profile.h"
 #include "engine/scene/edit_splats.h"
 #include "shaders/shared/limits.h"
 #include "tests/support/splat_files.h"

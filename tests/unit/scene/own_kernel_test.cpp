@@ -8,9 +8,9 @@
 #include <span>
 
 #include "engine/core/error.h"
-#include "engine/kernels/gaussian_equivalent.h"
+#include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/kernel_registry.h"
-#include "engine/scene/gaussian_scene.h"
+#include "engine/scene/dot_splat.h"
 #include "engine/scene/ply.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/test_scene.h"

@@ -8,12 +8,12 @@
 
 #include "engine/core/error.h"
 #include "engine/kernels/shaped_kernel.h"
-#include "engine/reference/random_scene.h"
-#include "engine/scene/gaussian_scene.h"
+#include "engine/reference/splats.h"
+#include "engine/scene/dot_splat.h"
 #include "engine/scene/merge_splats.h"
 #include "engine/scene/ply.h"
 #include "engine/scene/splat_file.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/kernel_forms.h"
 #include "tests/support/splat_files.h"
 

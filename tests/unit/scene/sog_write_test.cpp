@@ -7,8 +7,8 @@
 #include <set>
 
 #include "engine/core/files.h"
-#include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/quantise.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/splat_files.h"
 

@@ -17,7 +17,6 @@
 #include "engine/core/files.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/ply.h"
-#include "engine/scene/splat_shapes.h"
 
 namespace darb {
 namespace {

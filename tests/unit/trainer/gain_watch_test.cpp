@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // When a run ends itself because held-out photos no longer gain.
-#include "trainer/step/gain_watch.h"
+#include "trainer/step/held_out_gain.h"
 
 #include <gtest/gtest.h>
 

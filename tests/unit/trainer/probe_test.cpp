@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // trainer/probe: what a probe of the degree does with the run that it forks, on a stand-in for a
 // run.
-#include "trainer/step/probe.h"
+#include "trainer/step/held_out_gain.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The time left of a run, estimated for runs whose pace was recorded (tools/lab/record_pace.py).
-#include "trainer/run/time_left.h"
+#include "trainer/run/progress.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "engine/data/colmap_write.h"
+#include "engine/data/colmap.h"
 #include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
 

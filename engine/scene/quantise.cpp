@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "engine/scene/chunk_order.h"
+#include "engine/scene/quantise.h"
 
 #include <algorithm>
 #include <cmath>

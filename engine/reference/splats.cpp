@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "engine/reference/random_scene.h"
+#include "engine/reference/splats.h"
 
 #include <cmath>
 
 #include "engine/core/rng.h"
 #include "engine/kernels/shaped_kernel.h"
-#include "engine/scene/splat_shapes.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb::reference {
 namespace {
