@@ -13,14 +13,15 @@ namespace darb {
 namespace {
 
 constexpr size_t kLooked = 100'000;
-constexpr double kTail = 0.02;  // left out at each end
-constexpr double kReach = 2.5;  // of the median distance: background farther away is cut
+constexpr double kTail = 0.02;  // share left out at each end
+constexpr double kReach = 2.5;  // in median distances: background farther away is cut
 constexpr float kLogitOfTenth = -2.2f;
 constexpr double kFramed = 1.35, kUnframed = 0.0005;  // radii; share of the splats in them
-constexpr double kWide = 1.5, kWidest = 0.1;  // a splat is framed to so many deviations, radii
+// standard deviations to which a splat is framed; the most, in radii
+constexpr double kWide = 1.5, kWidest = 0.1;
 
 struct Sample {
-    glm::dvec3 position;  // from the origin
+    glm::dvec3 position;  // relative to the origin
     double reach;         // largest standard deviation, world units
 };
 

@@ -19,10 +19,11 @@ namespace darb {
 
 namespace {
 
-constexpr double kLongest_s = 24 * 60 * 60;  // a clock's time of day or since 1970 is longer
+constexpr double kLongest_s = 24 * 60 * 60;  // times of day and times since 1970 are longer
 
 // Position, field of view and quaternion as one vector of eight numbers. The field of view is
-// ln tan(fov / 2): whatever a curve does between two keys, it stays between 0 and 180 degrees.
+// stored as ln tan(fov / 2), so that it stays between 0 and 180 degrees whatever a curve does
+// between two keys.
 using Row = std::array<double, 8>;
 
 Row row_of(const KeyFrame& key, const glm::dquat& near_to) {
@@ -129,7 +130,8 @@ CameraPath read_camera_path(const std::filesystem::path& file) {
     path.file = file;
     if (!path.keys.empty()) return path;
     if (!json.is_object() || !json.contains("key_frames") || !json["key_frames"].is_array())
-        throw Error(file.string(), "is no camera path: it has neither key_frames nor camera_path",
+        throw Error(file.string(),
+                    "is not a camera path: it has neither key_frames nor camera_path",
                     json.is_array() || (json.is_object() && json.contains("frames"))
                         ? "It lists cameras: use it with --cameras."
                         : hint);
@@ -148,9 +150,9 @@ CameraPath read_camera_path(const std::filesystem::path& file) {
                     where, fmt::format("its time is {} s; 0 to {} can be", key.seconds, kLongest_s),
                     "Count the seconds from the start of the path.");
             if (!path.keys.empty() && key.seconds <= path.keys.back().seconds)
-                throw Error(where, "its time is not after that of the key before", hint);
+                throw Error(where, "its time is not after that of the previous key", hint);
             if (!(glm::length(key.orientation) > 1e-6))
-                throw Error(where, "its orientation is no quaternion", hint);
+                throw Error(where, "its orientation is not a quaternion", hint);
             if (!(key.fov_y > 0 && key.fov_y < glm::pi<double>()))
                 throw Error(where, "its field of view is not between 0 and 180 degrees", hint);
             key.orientation = glm::normalize(key.orientation);
@@ -167,13 +169,13 @@ CameraPath read_camera_path(const std::filesystem::path& file) {
 namespace {
 
 constexpr double kAbove = glm::radians(15.0), kHighest = glm::radians(75.0);
-constexpr double kFilledByTurn = 0.94;  // of the picture
-constexpr int kSides = 24;              // from which the distance is chosen
+constexpr double kFilledByTurn = 0.94;  // share of the picture that the subject fills
+constexpr int kSides = 24;              // directions from which the distance is chosen
 constexpr double kFartherThanPhotos = 1.25;
-constexpr double kLeastGap = glm::radians(120.0);  // that is no turn all round any more
+constexpr double kLeastGap = glm::radians(120.0);  // with a wider gap the cameras make no full turn
 constexpr double kWholeTurn = 2 * glm::pi<double>();
 
-/// Where the turn goes, seen from the middle.
+/// The course of the turn, seen from the middle.
 struct Course {
     double above = kAbove;             // rad
     double from = 0, to = kWholeTurn;  // rad, about up
@@ -181,7 +183,8 @@ struct Course {
     double most_distance = HUGE_VAL;  // world
 };
 
-/// Angles about up from `ahead`, ascending; how high they are; how far.
+/// Where the cameras stand: angles about up from `ahead`, ascending; their heights; their
+/// distances.
 struct Stands {
     std::vector<double> turns, heights, distances;
 };
@@ -189,7 +192,7 @@ struct Stands {
 Stands stands_of(const Subject& subject, const Navigation& view,
                  const std::vector<Camera>& cameras) {
     Stands stands;
-    // A view that turns to the right by an angle stands that much farther to the left.
+    // Turning the view to the right moves its stand to the left by the same angle.
     const glm::dvec3 back = -view.forward(), left = -view.right();
     for (const Camera& camera : cameras) {
         const glm::dvec3 way =
@@ -204,7 +207,7 @@ Stands stands_of(const Subject& subject, const Navigation& view,
     return stands;
 }
 
-/// The widest gap between neighbours, with where it ends.
+/// The widest gap between neighbours, and the angle at which it ends.
 std::pair<double, double> widest_gap(const std::vector<double>& turns) {
     double widest = 0, end = 0;
     for (std::size_t i = 0; i < turns.size(); ++i) {
@@ -223,7 +226,7 @@ Course course_of(const Subject& subject, const Navigation& view,
     const Stands stands = stands_of(subject, view, cameras);
     if (stands.turns.empty()) return course;
     course.above = std::clamp(median(stands.heights), -kHighest, kHighest);
-    if (subject.around) {  // of the view, not of where it stands
+    if (subject.around) {  // the turn moves the view, not the stand
         course.above = -course.above;
         return course;
     }
@@ -268,7 +271,8 @@ CameraPath turntable(const SplatModel& model, const TurntableOptions& options) {
         view.look_from(subject.centre, distance);
         if (subject.around) view.eye = subject.centre;
         path.add(view, 1.0 / options.fps);
-        path.keys.back().seconds = static_cast<double>(frame) / options.fps;  // no sum of roundings
+        // a sum of steps would add up roundings
+        path.keys.back().seconds = static_cast<double>(frame) / options.fps;
     }
     return path;
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// CameraPath: key frames that a camera flies through smoothly. Position and the logarithm of
-// tan(fov / 2) are cubic Hermite curves through the keys, tangents by finite differences over time
-// (Catmull-Rom where the times are even); orientation is the same curve on quaternions of one
-// hemisphere, normalised.
+// CameraPath: key frames that a camera flies through smoothly. The position and the logarithm of
+// tan(fov / 2) follow cubic Hermite curves through the keys, with tangents from finite differences
+// over time (Catmull-Rom where the times are even). The orientation follows the same curve on
+// quaternions of one hemisphere, which are then normalised.
 #pragma once
 
 #include <filesystem>
@@ -26,44 +26,44 @@ struct KeyFrame {
 
 struct CameraPath {
     std::vector<KeyFrame> keys;
-    std::filesystem::path file;  // that it was read from, for messages; may be empty
-    // Of a path of nerfstudio, which says them; else 0.
+    std::filesystem::path file;  // the file that the path was read from, for messages; may be empty
+    // Set by a path of nerfstudio, which names them; otherwise 0.
     int width = 0, height = 0;  // px
     double fps = 0;             // frames a second
     std::vector<std::string> notes;
 
     double duration() const { return keys.empty() ? 0 : keys.back().seconds; }
-    /// The current view, `seconds` after the last key (the first is at 0).
+    /// Adds the current view as a key, `seconds` after the last one (the first key is at 0).
     void add(const Navigation& view, double seconds = 2);
-    /// Before the first and after the last key: that key. The path must not be empty.
+    /// Times outside the path give its first or its last key. The path must not be empty.
     KeyFrame sample(double seconds) const;
 };
 
-/// Puts the camera there; up and pivot distance stay.
+/// Moves the camera to the key; its up and pivot distance stay.
 void apply(const KeyFrame& key, Navigation& view);
 
-/// JSON: {"key_frames": [{"seconds", "eye": [3], "orientation": [w, x, y, z], "fov_y_degrees"}]}.
-/// read takes a camera_path.json of nerfstudio, too, with a key for each of its frames. It throws
-/// Error naming file and key; a path lasts at most a day.
+/// The file is JSON: {"key_frames": [{"seconds", "eye": [3], "orientation": [w, x, y, z],
+/// "fov_y_degrees"}]}. read also takes a camera_path.json of nerfstudio, with a key for each of its
+/// frames. It throws an Error that names the file and the key; a path lasts at most a day.
 void write_camera_path(const std::filesystem::path& file, const CameraPath& path);
 CameraPath read_camera_path(const std::filesystem::path& file);
 
-// A camera that goes once around a scene, as a film of it begins where there are no cameras.
+// A camera that goes once around a scene, which is the film of a scene without a camera path.
 
 struct TurntableOptions {
-    double seconds = 6;  // of the turn
+    double seconds = 6;  // how long the turn takes
     int fps = 30;
-    int width = 1280, height = 720;  // px, of the frames
+    int width = 1280, height = 720;  // size of the frames, px
     glm::dvec3 up{0, -1, 0};         // unit, world
-    std::vector<Camera> cameras;     // of the photos; may be none
+    std::vector<Camera> cameras;     // the photos' cameras; may be none
 };
 
-/// A key for each frame; the one after the last would be the first. Around the subject_of the
-/// cameras, as high above it as they stand in the middle, and as near as it is seen whole all the
-/// way, but no farther than they are by more than a quarter: behind them there is nothing that they
-/// saw. Where they leave a third of a turn or more out, the camera goes to and fro where they were.
-/// Where they look outwards it stands among them and turns its head. Without cameras: from 15
-/// degrees above.
+/// Makes a key for each frame; the one after the last would be the first again. The camera circles
+/// the subject_of the cameras at their median height. It is as near as the subject is seen whole
+/// all the way, but at most a quarter farther than the cameras are, because there is nothing behind
+/// them that they saw. Where they leave out a third of a turn or more, the camera goes to and fro
+/// where they were. Where they look outwards, it stands among them and turns its head. Without
+/// cameras it looks down from 15 degrees above.
 CameraPath turntable(const SplatModel& model, const TurntableOptions& options);
 
 }  // namespace darb

@@ -75,7 +75,8 @@ void Canvas::begin(const BufferPicture& picture, const glm::vec3& colour) {
     } else if (picture.width == width() && picture.height == height()) {
         commands().copy(*picture.pixels, image_);
     } else {
-        // Exactly as large as the picture: a linear filter reads to the image's edge.
+        // The image must be exactly as large as the picture, because a linear filter reads up to
+        // its edge.
         if (unscaled.width() != picture.width || unscaled.height() != picture.height)
             unscaled =
                 DeviceImage(*device_, "picture", picture.width, picture.height, kCanvasFormat);

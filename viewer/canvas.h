@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Canvas: the image of a window's whole content, the scene's picture with the panels drawn over
-// it; then given to a swapchain or read back. Needs a queue with graphics.
+// Canvas: the image of a window's whole content, which is the scene's picture with the panels drawn
+// over it. It is then given to a swapchain or read back. It needs a queue with graphics.
 //
-// Two frames may be under way. They share the image, in the order of the queue; commands, and the
-// memory that Dear ImGui writes for them, are of each frame.
+// Two frames may be under way. They share the image, in the order of the queue, but each has its
+// own commands and its own memory for what Dear ImGui writes.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -20,10 +20,10 @@ namespace darb {
 
 inline constexpr VkFormat kCanvasFormat = VK_FORMAT_B8G8R8A8_UNORM;
 
-/// Frames that the host has given to the device and that may not be done.
+/// Frames that the host has given to the device and that may not be done yet.
 inline constexpr int kFramesUnderWay = 2;
 
-/// For destructors: a device that is lost has nothing under way.
+/// For destructors: a lost device has nothing under way, so its error is ignored.
 inline void finish_quietly(const Device& device) noexcept {
     try {
         device.wait_idle();
@@ -31,7 +31,7 @@ inline void finish_quietly(const Device& device) noexcept {
     }
 }
 
-/// A picture in a buffer: B8G8R8A8 [height][width]. Without a buffer there is none.
+/// A picture in a buffer: B8G8R8A8 [height][width]. A null buffer means that there is no picture.
 struct BufferPicture {
     const Buffer* pixels = nullptr;
     int width = 0, height = 0;  // px
@@ -49,15 +49,15 @@ class Canvas {
     int width() const { return image_.width(); }
     int height() const { return image_.height(); }
 
-    /// A frame begins: waits for the one before the last. What the host keeps for a frame may be
-    /// used again then. Throws DeviceLost.
+    /// Begins a frame after waiting for the one before the last. From then on, what the host keeps
+    /// for that frame may be used again. Throws DeviceLost.
     void begin_frame();
-    /// Makes it this large, in px; the picture before is lost when the size changes.
+    /// Makes the image this large, in px; a change of size loses the picture.
     void resize(int width, int height);
 
-    /// Starts a recording: what `first` records; the picture, scaled to the canvas where its size
-    /// differs, or this colour where there is none; then `draw` inside the render pass. The caller
-    /// runs it.
+    /// Starts a recording: what `first` records, then the picture, scaled to the canvas where its
+    /// size differs (or this colour where there is no picture), then `draw` inside the render pass.
+    /// The caller runs the commands.
     template <class First, class Draw>
     void compose(const BufferPicture& picture, const glm::vec3& colour, const First& first,
                  const Draw& draw) {
@@ -72,7 +72,7 @@ class Canvas {
     DeviceImage& image() { return image_; }
     void submit_and_wait() { commands().submit_and_wait(); }
 
-    /// The composed image as RGB. Waits.
+    /// The composed image as RGB. Waits for the device.
     ImageU8 read_back();
 
   private:

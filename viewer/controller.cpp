@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Not one of a link either, to whatever it leads.
+// A name is not free if a link has it, wherever the link leads.
 fs::path free_picture_name() {
     for (int n = 1;; ++n) {
         const fs::path file = fmt::format("darb_{:03d}.png", n);
@@ -53,7 +53,7 @@ void Controller::take_pictures_of_run() {
     });
 }
 
-// The device's copy first: when that fails, the scene before is still there.
+// The device's copy is made first: when that fails, the previous scene is still there.
 void Controller::show(LoadedScene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded.scene));
     painter_->open(*scene);
@@ -67,7 +67,7 @@ void Controller::merge(LoadedScene loaded) {
     const std::size_t count = document_->merge(std::move(loaded.scene.model));
     try {
         show_edits();
-    } catch (const std::exception&) {  // the device has no room: as it was before
+    } catch (const std::exception&) {  // no room on the device: everything stays as it was
         s.edit.take_back(s.scene->model);
         show_edits();
         throw;
@@ -138,18 +138,20 @@ void Controller::act(int width, int height) {
 
 double Controller::expire_toasts() {
     Session& s = *session_;
-    if (std::exchange(told_, s.told) != s.told) painter_->unsettle();  // it is not drawn yet
+    // the new message is not drawn yet
+    if (std::exchange(told_, s.told) != s.told) painter_->unsettle();
     const auto now = std::chrono::steady_clock::now();
     while (!s.toasts.empty() && s.toasts.front().until <= now) s.toasts.pop_front();
     if (s.toasts.empty()) return std::numeric_limits<double>::infinity();
     return std::chrono::duration<double>(s.toasts.front().until - now).count() + 0.001;
 }
 
-// What a user drops: not on a run, and not over unsaved edits without a question.
+// Handles a file that a user drops. It is refused during a run, and unsaved edits lead to a
+// question first.
 void Controller::drop(const fs::path& path) {
     Session& s = *session_;
     if (s.training.live && !s.training.finished)
-        s.tell("A run is shown: files can be opened when it is over.");
+        s.tell("A run is shown; files can be opened when it is over.");
     else if (s.scene && s.edit.unsaved())
         s.leaving = Leaving{false, path};
     else
@@ -186,7 +188,7 @@ void Controller::take_picture(int width, int height) {
     session_->tell("picture in " + file.string());
 }
 
-// Not with edits that are not saved, without a question.
+// Asks first where edits are not saved.
 void Controller::quit() {
     if (session_->scene && session_->edit.unsaved())
         session_->leaving = Leaving{true, {}};
@@ -203,7 +205,7 @@ void Controller::leave() {
         document_->load(leaving.open, true);
 }
 
-// Where it cannot be saved one stays, with the message.
+// Where saving fails, the viewer stays open and shows the message.
 void Controller::save_and_leave() {
     const std::optional<Leaving> leaving = std::exchange(session_->leaving, std::nullopt);
     document_->save_scene(*device_);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Controller: what was asked. Keys, the pointer and its tools act on the document at once; what
-// they, the panels and the window request is done by the document and the painter, in order.
+// Controller: what was asked. Keys, the pointer and its tools act on the document at once. Requests
+// of theirs, of the panels and of the window are carried out by the document and the painter, in
+// order.
 #pragma once
 
 #include <filesystem>
@@ -17,18 +18,18 @@ class Controller {
     Controller(Device& device, Session& session, Document& document, Painter& painter)
         : device_(&device), session_(&session), document_(&document), painter_(&painter) {}
 
-    /// What a load ended with since the last frame.
+    /// Takes the result of a load that ended since the last frame.
     void take_loaded();
-    /// What the run that is shown has drawn since the last frame.
+    /// Takes the pictures that a running training has drawn since the last frame.
     void take_pictures_of_run();
-    /// Shows what was loaded. Throws Error and keeps the scene before.
+    /// Shows what was loaded. Throws Error and keeps the current scene.
     void show(LoadedScene loaded);
-    /// What the user did since the last frame. Whether a key is held that goes on moving the camera
-    /// by itself.
+    /// Takes what the user did since the last frame. Returns whether a key is held that keeps
+    /// moving the camera.
     bool take_input(const Input& input, const ControlFrame& frame);
-    /// The requests that wait.
+    /// Carries out the requests that wait.
     void act(int width, int height);
-    /// Seconds until a message over the picture goes; infinity where there is none.
+    /// Seconds until a message over the picture goes away; infinity where there is none.
     double expire_toasts();
 
   private:
@@ -46,7 +47,7 @@ class Controller {
     Session* session_;
     Document* document_;
     Painter* painter_;
-    int told_ = 0;  // Session::told of the last frame
+    int told_ = 0;  // Session::told at the last frame
 };
 
 }  // namespace darb

@@ -16,7 +16,7 @@ bool run_goes_on(const Session& s) {
     return s.training.live && !s.training.finished;
 }
 
-// From the free camera to the first or the last.
+// From the free camera it steps to the first or the last one.
 void step_camera(Session& s, bool next) {
     const int count = static_cast<int>(s.photos.views.size());
     if (count == 0) return;
@@ -37,7 +37,7 @@ void step_training(Session& s) {
     ++s.training.steps_to_go;
 }
 
-// What is selected; else what is in the box or sphere that is shown.
+// Removes the selection, or what is inside the box or sphere that is shown.
 void remove_selected(Session& s) {
     if (!s.scene || s.edit.transforms()) return;
     if (s.edit.selected_count() > 0)
@@ -105,7 +105,7 @@ constexpr KeyRow kKeys[] = {
     {Key::escape, stop_and_close},
 };
 
-// Right, up, ahead; a key and its opposite cancel.
+// The directions right, up and ahead; a key and its opposite cancel out.
 glm::dvec3 flight(const Input& in) {
     return {double(in.to_right) - double(in.to_left), double(in.rise) - double(in.sink),
             double(in.ahead) - double(in.back)};
@@ -115,7 +115,8 @@ void drag(const Input& in, int height, Session& s) {
     Navigation& n = s.navigation;
     const bool pans = in.middle || (in.left && in.shift);
     if (!pans && !in.left && !in.right) return;
-    const double turn = glm::pi<double>() / std::max(height, 1);  // half a turn a window's height
+    // the window's height is half a turn
+    const double turn = glm::pi<double>() / std::max(height, 1);
     leave_photo(s);
     if (pans)
         n.pan(in.dx, in.dy, height);
@@ -125,7 +126,7 @@ void drag(const Input& in, int height, Session& s) {
         n.orbit(in.dx * turn, in.dy * turn);
 }
 
-// While flying the wheel changes the speed.
+// While flying, the wheel changes the speed.
 void turn_wheel(const Input& in, Session& s) {
     if (in.right || (flight(in) != glm::dvec3(0.0) && !in.control)) {
         s.fly_speed *= std::pow(1.25, in.wheel);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What keys and the pointer do: with the camera at once, with everything else as requests.
+// What keys and the pointer do: they move the camera at once, and everything else becomes a
+// request.
 #pragma once
 
 #include "viewer/input.h"
@@ -7,7 +8,7 @@
 
 namespace darb {
 
-/// Of a frame in which input is looked at.
+/// The frame in which input is handled.
 struct ControlFrame {
     int width = 0, height = 0;  // px of the window
     double seconds = 0;         // since the frame before
@@ -16,11 +17,11 @@ struct ControlFrame {
 
 void press(Key key, Session& session);
 void move_camera(const Input& input, const ControlFrame& frame, Session& session);
-/// The camera goes on along the path that is played.
+/// Moves the camera along the path that is being played.
 void play_path(double seconds, Session& session);
-/// Back to the free camera, where it is.
+/// Switches back to the free camera, which takes over the current view.
 void leave_photo(Session& session);
-/// One that moves the camera.
+/// Whether a key that moves the camera is held.
 bool holds_a_key(const Input& input);
 
 }  // namespace darb

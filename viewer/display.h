@@ -11,8 +11,8 @@
 
 namespace darb {
 
-/// splats: as they are; points: dots at the means; ellipsoids: hard ellipses of two standard
-/// deviations, nearly opaque.
+/// splats: as they are; points: a dot at each mean; ellipsoids: nearly opaque ellipses with hard
+/// edges at two standard deviations.
 enum class SplatStyle { splats, points, ellipsoids };
 
 struct DisplaySettings {
@@ -20,14 +20,14 @@ struct DisplaySettings {
     SplatStyle style = SplatStyle::splats;
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
-    Accuracy accuracy;  // all but footprint and SH degree, which stand here
-    int sh_degree = 3;  // highest in use
+    Accuracy accuracy;  // all but footprint and SH degree, which are members here
+    int sh_degree = 3;  // highest degree in use
     ProjectionEffects effects;
     HugeSplatPath huge_splat_path = HugeSplatPath::by_counters;
     glm::vec3 background{0.0f};
     float near_plane = static_cast<float>(NEAR_DEFAULT);  // world units
-    float error_max = 0.25f;   // mean absolute difference that is shown hottest
-    float count_max = 500.0f;  // intersections that are shown hottest
+    float error_max = 0.25f;   // mean absolute difference that gets the hottest colour
+    float count_max = 500.0f;  // intersections that get the hottest colour
 
     bool operator==(const DisplaySettings&) const = default;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What is shown: a file that was loaded, or a training run; how each is meant to be shown, and what
-// of it is written to files.
+// What is shown is a file that was loaded or a training run. The document knows how each is meant
+// to be shown, and what of it has been written to files.
 #include "viewer/document.h"
 
 #include <fmt/format.h>
@@ -28,15 +28,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kFilled = 0.94;  // of the free area, by what is framed
+constexpr double kFilled = 0.94;  // share of the free area that a framed scene fills
 
 bool any_lens(const std::vector<View>& views) {
     return std::any_of(views.begin(), views.end(),
                        [](const View& v) { return v.camera.lens.active; });
 }
 
-// Beside the scene, in its format where that is written; of a run in its output folder, where its
-// cameras are.
+// Edits are saved beside the scene, in its format where that can be written. Those of a run go into
+// its output folder, where its cameras are.
 fs::path edited_name(const fs::path& file) {
     const fs::path run = run_of_scene(file);
     if (!run.empty()) return run / (scene_name(file) + "_edited.ply");
@@ -63,7 +63,7 @@ Document::Document(Session& session, ViewerOptions options)
     session.photos.views = options_.views;
     session.navigation.set_up(start_up(options_));
     session.display.accuracy = options_.accuracy;
-    // Of each scene that is opened, see show_as_meant.
+    // These apply to each scene that is opened; see show_as_meant.
     session.display.accuracy.choice[kFootprint] = session.display.accuracy.choice[kShDegree] = 0;
 }
 
@@ -100,7 +100,7 @@ bool Document::edited_meanwhile() const {
 }
 
 bool Document::show(std::unique_ptr<Scene> scene, const fs::path& asked, bool dropped) {
-    // The scene of a run that was shown: from where the user looked at the run.
+    // The scene of a run that was shown is seen from where the user looked at the run.
     const bool of_run = session_->scene == nullptr && session_->training.finished;
     const bool first = session_->scene == nullptr && !of_run;
     session_->leaving.reset();
@@ -117,7 +117,7 @@ bool Document::show(std::unique_ptr<Scene> scene, const fs::path& asked, bool dr
     measured_model_ = 0;
     try {
         recent_.opened(asked);
-    } catch (const std::exception& e) {  // the scene is there all the same
+    } catch (const std::exception& e) {  // the scene is shown all the same
         session_->scene->notes.emplace_back(e.what());
     }
     session_->selection.region = {Region::Shape::box, s.subject.centre,
@@ -150,7 +150,7 @@ void Document::follow_edits() {
     measured_model_ = s.edit.model_version();
 }
 
-// Through a camera of the data set where there are some; else from outside, upright.
+// Looks through a camera of the data set where there is one, otherwise from outside and upright.
 void Document::first_look(bool of_run) {
     const Scene& s = *session_->scene;
     Photos& p = session_->photos;
@@ -172,7 +172,7 @@ void Document::first_look(bool of_run) {
     }
 }
 
-// Where cameras or the command line say what is up, nothing is to be remembered.
+// Nothing needs to be remembered where cameras or the command line say what is up.
 void Document::remember_up() {
     const glm::dvec3 up = session_->navigation.up;
     if (!session_->scene || up == known_up_) return;
@@ -181,7 +181,7 @@ void Document::remember_up() {
     if (session_->photos.views.empty()) remembered_.keep(session_->scene->file, up);
 }
 
-// What was merged into it belongs to it, wherever it is.
+// Scenes that were merged into this one count as a part of it, wherever they are.
 void Document::find_subject(Scene& scene) const {
     const std::vector<std::size_t> parts = session_->edit.parts();
     const bool merged = session_->scene.get() == &scene && parts.size() > 1;
@@ -205,7 +205,8 @@ Subject Document::shown_subject() const {
     return {live_bounds_};
 }
 
-// As far as what is looked at: orbits turn around it, pans follow the hand.
+// Puts the pivot at the depth of what is looked at: orbits turn around it, and pans follow the
+// hand.
 void Document::set_pivot() {
     constexpr int kSize = 1000;  // px
     static const SplatModel kNone;
@@ -216,7 +217,7 @@ void Document::set_pivot() {
                              p.current >= 0 ? p.view().camera : n.camera(kSize, kSize));
 }
 
-// So that the picture does not jump where the free camera takes over from the photo's.
+// The picture must not jump where the free camera takes over from the photo's.
 void Document::follow_photo(int width, int height) {
     Photos& p = session_->photos;
     if (p.current < 0) return;
@@ -235,14 +236,14 @@ void Document::choose_camera(int n) {
                     "Name the data set, or a cameras.json: --cameras DATASET.");
     session_->photos.current = n;
     session_->photos.failed = false;
-    take_back<request::FrameAll>(session_->requests);  // of a load before
+    take_back<request::FrameAll>(session_->requests);  // requests for an earlier scene
     session_->navigation.take(session_->photos.view().camera);
     if (!empty()) set_pivot();
 }
 
 void Document::need_scene(const char* what) const {
     if (follows_run())
-        throw Error(what, "a run is shown", "Wait for its end: its scene is opened then.");
+        throw Error(what, "a run is shown", "Wait for its end, when its scene is opened.");
     if (!session_->scene)
         throw Error(what, "there is no scene",
                     "Open one: name it on the command line, or drop it on the window.");
@@ -266,7 +267,7 @@ void Document::frame_on(const Bounds& bounds, int width, int height) {
         n.frame(bounds.centre, bounds.radius, wide / height);
 }
 
-// Cameras belong to the scene that they were opened with.
+// Cameras belong to the scene with which they were opened.
 void Document::find_own_cameras(const std::filesystem::path& scene,
                                 std::vector<std::string>& notes) {
     if (!options_.find_cameras) return;
@@ -279,7 +280,7 @@ void Document::find_own_cameras(const std::filesystem::path& scene,
     }
 }
 
-// As the file says, but for what the command line wants otherwise.
+// Shows the scene as its file says, except where the command line asks for something else.
 void Document::show_as_meant(const Scene& s, bool first) {
     DisplaySettings& d = session_->display;
     d.kernel = s.model.kernel;
@@ -323,7 +324,7 @@ void Document::follow_run(LivePicture& pictures, const Bounds& bounds, const Liv
     set_pivot();
 }
 
-// Whoever sees every degree there is goes on to.
+// A user who sees every degree goes on to see every degree.
 void Document::show_degree(int degree) {
     DisplaySettings& d = session_->display;
     if (d.sh_degree == session_->sh_degree) d.sh_degree = degree;
@@ -334,7 +335,7 @@ void Document::show_as_trained(const LiveScene& scene, bool first) {
     live_scene_ = scene;
     DisplaySettings& d = session_->display;
     if (first) d.sh_degree = session_->sh_degree;
-    show_degree(scene.sh_degree);  // it grows
+    show_degree(scene.sh_degree);  // a run's degree grows
     d.effects.smoothing = session_->own.effects.smoothing = scene.antialias && scene.smoothing;
     if (!first) return;
     d.kernel = scene.kernel;
@@ -358,7 +359,7 @@ std::optional<LiveMade> Document::take_picture_of_run() {
     return made;
 }
 
-// The run draws what is wished for when it comes to it; until then its last picture is there.
+// The run draws the wish when it gets to it; until then its last picture stays.
 void Document::wish(int width, int height) {
     if (live_ == nullptr) return;
     Session& s = *session_;
@@ -374,7 +375,7 @@ void Document::wish(int width, int height) {
 
 void Document::end_run() {
     live_ = nullptr;
-    session_->photos.loaded = -1;  // on another device
+    session_->photos.loaded = -1;  // the photo is loaded on another device
     session_->training.finished = true;
 }
 
@@ -415,7 +416,7 @@ void Document::save_scene(Device& device) {
     s.tell(said);
 }
 
-// Opens at what the window shows; the cameras of the photos follow.
+// The page opens at the window's view, and the cameras of the photos follow.
 void Document::save_page(Device& device, int width, int height) {
     Session& s = *session_;
     if (!s.scene) return;
@@ -428,7 +429,7 @@ void Document::save_page(Device& device, int width, int height) {
     options.views = s.photos.views;
     View shown;
     shown.name = "As it was saved";
-    // What is seen beside the panel, which a page does not have.
+    // The page shows what is seen beside the panel, as it has none.
     const int left = free_area(s, width, height).left;
     Navigation centred = s.navigation;
     centred.centre_x = 0.5;

@@ -19,11 +19,11 @@ namespace darb {
 
 namespace {
 
-constexpr double kColourOfDc = 0.28209479177387814;  // the harmonic of degree 0
+constexpr double kColourOfDc = 0.28209479177387814;  // the value of the harmonic of degree 0
 
-constexpr std::size_t kPiece = 1 << 15;  // splats that a thread takes
+constexpr std::size_t kPiece = 1 << 15;  // splats for each thread
 
-/// has: of a splat's index; must not throw.
+/// has: a predicate of a splat's index; must not throw.
 template <class Has>
 SplatMask mask_of(const SplatModel& model, const Has& has) {
     SplatMask mask(model.size());
@@ -33,10 +33,10 @@ SplatMask mask_of(const SplatModel& model, const Has& has) {
     return mask;
 }
 
-/// has: of the px of a splat's centre.
+/// has: a predicate of the px of a splat's centre.
 template <class Has>
 SplatMask on_screen(const SplatModel& model, const Camera& camera, const Has& has) {
-    Camera from_origin = camera;  // whose world begins at the model's origin
+    Camera from_origin = camera;  // its world begins at the model's origin
     from_origin.translation += camera.rotation * model.origin;
     return mask_of(model, [&](std::size_t i) {
         const float* p = &model.position[3 * i];
@@ -45,7 +45,7 @@ SplatMask on_screen(const SplatModel& model, const Camera& camera, const Has& ha
     });
 }
 
-/// The edges of a closed line by the rows of the screen that they cross.
+/// The edges of a closed line, sorted by the rows of the screen that they cross.
 class LassoRows {
   public:
     explicit LassoRows(const std::vector<glm::dvec2>& lasso) : lasso_(lasso) {
@@ -60,7 +60,7 @@ class LassoRows {
                 rows_[r].push_back(i);
         }
     }
-    /// Even-odd.
+    /// By the even-odd rule.
     bool has(const glm::dvec2& p) const {
         if (rows_.empty() || !(p.y >= low_ && p.y <= high_)) return false;
         bool inside = false;
@@ -78,11 +78,11 @@ class LassoRows {
     std::size_t row(double y) const { return static_cast<std::size_t>((y - low_) / row_px_); }
     const std::vector<glm::dvec2>& lasso_;
     double low_ = 0, high_ = 0, row_px_ = 1;
-    std::vector<std::vector<std::size_t>> rows_;  // of edges, by their beginnings
+    std::vector<std::vector<std::size_t>> rows_;  // rows of edges, by where the edges begin
 };
 
-/// The segments of a stroke by the cells of the screen that they may cover, so that millions of
-/// splats are looked up at once.
+/// The segments of a stroke, sorted by the cells of the screen that they may cover, so that
+/// millions of splats are looked up quickly.
 class BrushCells {
   public:
     BrushCells(const std::vector<glm::dvec2>& stroke, double radius)
@@ -108,10 +108,10 @@ class BrushCells {
   private:
     static constexpr double kLeastCell_px = 2, kMostCells = 1024;
     struct Cell {
-        bool whole = false;  // covered by one segment
+        bool whole = false;  // one segment covers the cell
         std::vector<std::size_t> segments;
     };
-    // To the segment that ends at this point of the stroke.
+    // The distance to the segment that ends at this point of the stroke.
     double distance(const glm::dvec2& p, std::size_t i) const {
         return distance_to_segment(p, stroke_[i > 0 ? i - 1 : 0], stroke_[i]);
     }
@@ -123,7 +123,7 @@ class BrushCells {
         const glm::dvec2 a = stroke_[i > 0 ? i - 1 : 0], b = stroke_[i];
         const glm::ivec2 from((glm::min(a, b) - radius_ - low_) / side_);
         const glm::ivec2 to((glm::max(a, b) + radius_ - low_) / side_);
-        const double half = side_ * std::sqrt(0.5);  // of a cell's diagonal
+        const double half = side_ * std::sqrt(0.5);  // half the diagonal of a cell
         for (int y = std::max(from.y, 0); y <= std::min(to.y, count_.y - 1); ++y)
             for (int x = std::max(from.x, 0); x <= std::min(to.x, count_.x - 1); ++x) {
                 Cell& cell = cells_[index({x, y})];
@@ -139,7 +139,7 @@ class BrushCells {
     std::vector<Cell> cells_;
 };
 
-/// Splats by the cube that they are in.
+/// Splats sorted by the cube in which they lie.
 class CubeGrid {
   public:
     CubeGrid(double side, const glm::dvec3& corner) : side_(side), corner_(corner) {}
@@ -160,7 +160,7 @@ class CubeGrid {
     using Cube = std::array<std::int64_t, 3>;
     Cube cube(const glm::dvec3& p) const {
         const glm::dvec3 c = glm::floor((p - corner_) / side_);
-        constexpr double kFar = 1 << 21;  // what is farther shares cubes, which is only slower
+        constexpr double kFar = 1 << 21;  // splats farther away share cubes, which is only slower
         return {static_cast<std::int64_t>(std::fmod(c.x, kFar)),
                 static_cast<std::int64_t>(std::fmod(c.y, kFar)),
                 static_cast<std::int64_t>(std::fmod(c.z, kFar))};
@@ -253,7 +253,7 @@ std::string counted(const char* verb, std::size_t count) {
     return fmt::format("{} {} splat{}", verb, count, count == 1 ? "" : "s");
 }
 
-// The splats of `part` take the place of these in the model.
+// Puts the splats of `part` back in place of these splats of the model.
 void put_back(const std::vector<std::uint32_t>& splats, const SplatModel& part, SplatModel& model) {
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& from = attribute_values(part, a);
@@ -274,7 +274,7 @@ void count_from(const glm::dvec3& origin, SplatModel& model) {
             static_cast<float>(double{model.position[i]} + shift[static_cast<int>(i % 3)]);
 }
 
-// Zeros for the bands above.
+// The bands above become zeros.
 void raise_sh_degree(int degree, SplatModel& model) {
     if (degree <= model.sh_degree) return;
     const std::size_t before = static_cast<std::size_t>(model.rest_count());
@@ -407,7 +407,7 @@ std::size_t Edit::end_transform(const SplatModel& model) {
     if (count == 0 || !was_dragged_) return 0;
     DARB_CHECK(model.size() == removed_.size(), "{} splats, {}", model.size(), removed_.size());
     push({counted("moved", count), ++last_id_, std::move(moved)});
-    changed_model();  // what waited for the end of the move follows
+    changed_model();  // updates what waited for the end of the move
     return count;
 }
 
@@ -447,14 +447,15 @@ std::size_t Edit::merge(SplatModel added, SplatModel& model) {
     if (added.kernel != model.kernel || added.footprint != model.footprint ||
         added.antialias != model.antialias)
         throw Error("the scene to merge",
-                    fmt::format("is of the kernel {}, this one of {}, or differs in footprint or "
+                    fmt::format("has the kernel {}, this one {}, or differs in footprint or "
                                 "antialiasing",
                                 kernel_name(added.kernel), kernel_name(model.kernel)),
-                    "One scene has one of each: train or convert both alike.");
+                    "A scene has one of each; train or convert both alike.");
     for (int a = 0; a < kAttributeCount; ++a)
         if (kSplatAttributes[static_cast<std::size_t>(a)].optional && added.size() > 0 &&
             model.size() > 0 && (added.floats(a) == 0) != (model.floats(a) == 0))
-            throw Error("the scene to merge", "has an attribute that this one lacks, or lacks one",
+            throw Error("the scene to merge",
+                        "has an attribute that this one lacks, or the other way round",
                         "Merge scenes that were trained alike.");
     raise_sh_degree(model.sh_degree, added);
     count_from(model.origin, added);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Edit: what was done to a scene since it was opened, step by step, with undo and redo: splats
-// selected, hidden, deleted, moved, and scenes merged into it. Marks lie beside the model; moves
-// and merges change the model, which the caller keeps and hands over, always the same.
+// Edit: what was done to a scene since it was opened, step by step, with undo and redo. Splats can
+// be selected, hidden, deleted and moved, and scenes can be merged into the scene. Marks lie beside
+// the model; moves and merges change the model, which the caller keeps and hands over. It must
+// always be the same one.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@
 
 namespace darb {
 
-/// [N] 1: has it, 0: has not.
+/// [N], 1 for splats that are in the set.
 using SplatMask = std::vector<std::uint8_t>;
 
 /// A box along the world's axes, or a sphere.
@@ -25,31 +26,32 @@ struct Region {
     enum class Shape { box, sphere };
     Shape shape = Shape::box;
     glm::dvec3 centre{0.0};     // world
-    glm::dvec3 half_size{1.0};  // world; of a sphere x is the radius
+    glm::dvec3 half_size{1.0};  // world; for a sphere x is the radius
     bool contains(const glm::dvec3& p) const;
 };
 
-/// Opposite corners, px.
+/// a and b are opposite corners, px.
 SplatMask in_rectangle(const SplatModel& model, const Camera& camera, glm::dvec2 a, glm::dvec2 b);
-/// px; its ends are joined, even-odd.
+/// The outline in px; its ends are joined, and the even-odd rule decides what is inside.
 SplatMask in_lasso(const SplatModel& model, const Camera& camera,
                    const std::vector<glm::dvec2>& lasso);
-/// Within the radius of the line through the points, px.
+/// Splats within the radius of the line through the points, px.
 SplatMask under_brush(const SplatModel& model, const Camera& camera,
                       const std::vector<glm::dvec2>& stroke, double radius);
 SplatMask in_region(const SplatModel& model, const Region& region);
-/// Opacity, 0 to 1.
+/// By opacity, 0 to 1.
 SplatMask by_opacity(const SplatModel& model, double low, double high);
-/// Largest standard deviation, world units.
+/// By the largest standard deviation, world units.
 SplatMask by_scale(const SplatModel& model, double low, double high);
-/// Colours without harmonics above degree 0, all channels within the tolerance, sRGB 0 to 1.
+/// By colour without harmonics above degree 0; all channels must be within the tolerance, sRGB 0 to
+/// 1.
 SplatMask by_colour(const SplatModel& model, const glm::dvec3& colour, double tolerance);
 /// The base colour, sRGB, not clamped.
 glm::dvec3 base_colour(const SplatModel& model, std::size_t splat);
-/// And all splats nearer than `distance` (world units, above 0) to one of the mask.
+/// Adds all splats nearer than `distance` (world units, above 0) to one of the mask.
 SplatMask grown(const SplatModel& model, const SplatMask& mask, double distance);
 
-/// How a new selection goes with the one before.
+/// How a new selection is combined with the one before.
 enum class Combine { replace, add, subtract };
 
 class Edit {
@@ -57,8 +59,8 @@ class Edit {
     explicit Edit(std::size_t splats = 0)
         : removed_(splats, 0), hidden_(splats, 0), selected_(splats, 0) {}
 
-    // Each is a step; one that changes nothing is none. They return how many splats changed.
-    // What is hidden or deleted is never selected.
+    // Each of these is a step unless it changes nothing. They return how many splats changed.
+    // Hidden and deleted splats are never selected.
     std::size_t select(const SplatMask& mask, Combine how);
     std::size_t invert_selection();
     std::size_t remove(const SplatMask& mask);
@@ -68,34 +70,37 @@ class Edit {
     /// Deletes the splats whose mean is inside the region (or outside: a crop).
     std::size_t remove(const SplatModel& model, const Region& region, bool inside);
 
-    /// A hand moves what is selected, or, where nothing is, all that is there: `total` since
-    /// begin_transform. end_transform makes it one step, cancel_transform none; after it and after
-    /// an undo the model is as it was, bit by bit.
+    /// While a hand drags, the selection moves, or everything where nothing is selected; `total`
+    /// counts from begin_transform. end_transform turns the drag into one step, and
+    /// cancel_transform drops it. After cancel_transform and after an undo the model is as it was,
+    /// bit by bit.
     void begin_transform(const SplatModel& model);
     void drag_transform(const Similarity& total, SplatModel& model);
     std::size_t end_transform(const SplatModel& model);
     void cancel_transform(SplatModel& model);
     bool transforms() const { return dragged_.has_value(); }
-    /// Appends the splats of another scene and selects them, nothing else. Throws Error where one
-    /// model cannot hold both: another kernel, or attributes that only one has. Harmonics of the
+    /// Appends the splats of another scene and selects only those. Throws Error where one model
+    /// cannot hold both: the kernels differ, or only one has some attribute. Harmonics of the
     /// lesser degree get zeros.
     std::size_t merge(SplatModel added, SplatModel& model);
 
-    /// Splats of the scene as it was opened and of each that was merged into it, in their order.
+    /// Counts of splats: of the scene as it was opened, then of each scene merged into it, in
+    /// order.
     std::vector<std::size_t> parts() const;
 
     bool can_undo() const { return done_ > 0; }
     bool can_redo() const { return done_ < steps_.size(); }
-    /// What was undone or redone, "deleted 12 splats"; "" where there was nothing to do.
+    /// Returns what was undone or redone, such as "deleted 12 splats"; "" where there was nothing
+    /// to do.
     std::string undo(SplatModel& model);
-    /// The last step was not: it cannot be done again either.
+    /// Undoes the last step so that it cannot be redone either.
     void take_back(SplatModel& model);
     std::string redo(SplatModel& model);
-    /// Of the last step.
+    /// What the last step did.
     const std::string& last() const;
     /// Grows with each change of the model itself, undone ones too.
     int model_version() const { return model_version_; }
-    /// Grows with each change that is seen without the highlight of a selection.
+    /// Grows with each change that is visible without the highlight of a selection.
     int seen_version() const { return seen_version_; }
     /// Grows with each change of anything.
     int version() const { return version_; }
@@ -107,31 +112,31 @@ class Edit {
     std::size_t removed_count() const { return removed_count_; }
     std::size_t hidden_count() const { return hidden_count_; }
     std::size_t selected_count() const { return selected_count_; }
-    /// Which content this is: equal where what would be saved is equal; 0: as it was opened.
+    /// Identifies the content: equal where the saved file would be equal; 0: as it was opened.
     int content() const;
-    /// What would be saved differs from the file and from the last mark_saved(). Selections and
-    /// what is hidden are not saved.
+    /// Whether the saved file would differ from the original and from the last mark_saved().
+    /// Selections and hidden splats are not saved.
     bool unsaved() const;
     void mark_saved() { saved_ = content(); }
     /// The scene without the deleted splats, in the same order.
     SplatModel apply(const SplatModel& model) const;
 
   private:
-    struct Marks {  // each mask's splats change theirs
+    struct Marks {  // each mask lists the splats whose mark changes
         std::vector<std::uint32_t> removed, hidden, selected;
     };
     struct Moved {
         std::vector<std::uint32_t> splats;
-        SplatModel other;  // of these: before the step where it is done, else after it
+        SplatModel other;  // the splats' other state: before a step that is done, else after it
     };
     struct Merged {
         SplatModel added;
-        int degree = 0;                       // of the model before
-        std::vector<std::uint32_t> selected;  // before
+        int degree = 0;                       // the model's degree before
+        std::vector<std::uint32_t> selected;  // the selection before
     };
     struct Step {
         std::string what;
-        int id = 0;  // of the content from here on; 0: as before
+        int id = 0;  // the content from here on; 0: as before
         std::variant<Marks, Moved, Merged> change;
     };
     void push(Step step);
@@ -145,12 +150,12 @@ class Edit {
 
     SplatMask removed_, hidden_, selected_;
     std::vector<Step> steps_;
-    std::size_t done_ = 0;  // of steps_
+    std::size_t done_ = 0;  // how many of steps_ are done
     std::size_t removed_count_ = 0, hidden_count_ = 0, selected_count_ = 0;
-    std::optional<Moved> dragged_;  // other: before
+    std::optional<Moved> dragged_;  // `other` holds the state before
     bool was_dragged_ = false;
     int last_id_ = 0, model_version_ = 0, seen_version_ = 0, version_ = 0;
-    int saved_ = 0;  // content when it was saved; 0: of the file
+    int saved_ = 0;  // content when it was saved; 0: that of the file
 };
 
 }  // namespace darb

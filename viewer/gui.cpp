@@ -21,11 +21,12 @@ namespace darb {
 
 namespace {
 
-constexpr float kFontPx = 15;     // at scale 1
-constexpr float kOwnFontPx = 13;  // ProggyClean, Dear ImGui's own, is sharp at multiples of it
-constexpr float kLargePx = 24;    // from here on a px is fine enough for a letter's place
+constexpr float kFontPx = 15;  // at scale 1
+// ProggyClean, Dear ImGui's own font, is sharp at multiples of this
+constexpr float kOwnFontPx = 13;
+constexpr float kLargePx = 24;  // from here on letters need no oversampling
 
-// What names of files may have: Latin with its extensions, Greek, Cyrillic, punctuation.
+// The letters that file names may have: Latin with its extensions, Greek, Cyrillic, punctuation.
 constexpr ImWchar kLetters[] = {0x20,   0x17F,  0x370,  0x3FF,  0x400,  0x52F, 0x2010,
                                 0x2027, 0x2030, 0x203A, 0x20AC, 0x20AC, 0};
 
@@ -41,7 +42,7 @@ void make_font(float px) {
     config.SizePixels = px * (file.empty() ? kOwnFontPx / kFontPx : 1);
     config.FontDataOwnedByAtlas = false;
     config.OversampleH = px < kLargePx ? 2 : 1;
-    config.RasterizerMultiply = 1.1f;  // light letters on dark look thin
+    config.RasterizerMultiply = 1.1f;  // light letters on a dark ground look thin
     if (file.empty())
         fonts.AddFontDefault(&config);
     else
@@ -65,7 +66,7 @@ Gui::Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* wind
 
     ImGui::CreateContext();
     ImGuiIO& io = ImGui::GetIO();
-    io.IniFilename = nullptr;  // leaves no file in the current folder
+    io.IniFilename = nullptr;  // keeps Dear ImGui from writing a file into the current folder
     if (window_ != nullptr) ImGui_ImplGlfw_InitForVulkan(window_, true);
     set_scale(scale);
 }
@@ -79,13 +80,14 @@ void Gui::start_backend() {
     info.Queue = device_->queue();
     info.PipelineCache = device_->pipeline_cache();
     info.DescriptorPool = pool_;
-    info.MinImageCount = info.ImageCount = kFramesUnderWay;  // sets of what it writes
+    // how many sets of buffers the backend keeps
+    info.MinImageCount = info.ImageCount = kFramesUnderWay;
     info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
     info.CheckVkResultFn = check_gui;
     ImGui_ImplVulkan_Init(&info, render_pass_);
 }
 
-// The backend frees the texture of the letters before when it ends, and not before that.
+// The backend frees the previous texture of the letters when it ends, and not earlier.
 void Gui::set_scale(float scale) {
     apply_theme(scale);
     if (ImGui::GetIO().BackendRendererUserData != nullptr) {
@@ -104,7 +106,7 @@ float pixels_per_unit(GLFWwindow* window) {
     return px > 0 && units > 0 ? static_cast<float>(px) / static_cast<float>(units) : 1;
 }
 
-// The backend has size and pointer in the window's units.
+// The backend reports size and pointer in the window's units.
 void Gui::use_pixels(int width, int height) const {
     ImGuiIO& io = ImGui::GetIO();
     io.DisplaySize = ImVec2(static_cast<float>(width), static_cast<float>(height));
@@ -122,7 +124,7 @@ void Gui::use_pixels(int width, int height) const {
 #endif
 }
 
-// From 1.90 on the backend uploads them itself.
+// From 1.90 on the backend uploads the fonts itself.
 void Gui::upload_fonts() {
 #if IMGUI_VERSION_NUM < 19000
     Commands commands(*device_);

@@ -13,22 +13,23 @@ namespace darb {
 
 class Gui {
   public:
-    /// All coordinates are px of the picture, the pointer's too. window: null where there is none.
-    /// The render pass stays.
+    /// All coordinates, including the pointer's, are px of the picture. window: null where there is
+    /// none. The render pass must outlive the Gui.
     Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* window);
     ~Gui();
     Gui(const Gui&) = delete;
     Gui& operator=(const Gui&) = delete;
 
-    /// Another scale: letters are drawn anew, sharp at the screen's pixels. Not within a frame.
+    /// Changes the scale and draws the letters anew, sharp at the screen's pixels. Not within a
+    /// frame.
     void set_scale(float scale);
-    /// Starts a frame of this size, px, with the input of the window.
+    /// Starts a frame of this size, px, with the window's input.
     void begin(int width, int height);
-    /// Ends it: what the panels said is ready for draw().
+    /// Ends the frame: what the panels drew is ready for draw().
     void end();
     void draw(VkCommandBuffer commands);
 
-    /// Whether the panels, not the scene, get the pointer or the keys.
+    /// Whether the panels, rather than the scene, get the pointer or the keys.
     bool wants_mouse() const;
     bool wants_keys() const;
 
@@ -42,12 +43,12 @@ class Gui {
     GLFWwindow* window_;
 };
 
-/// Framebuffer px of one unit of a window's coordinates, in which the window system has sizes and
+/// Framebuffer px for each unit of window coordinates, in which the window system reports sizes and
 /// the pointer: 2 on some high-DPI desktops, 1 on others.
 float pixels_per_unit(GLFWwindow* window);
 
-// The colours of panels and of what is drawn over pictures. Text on any of its grounds has a
-// contrast of at least 7 to 1, text of what is switched off 4.5 to 1 (WCAG 2.1, 1.4.6 and 1.4.3).
+// The colours of the panels and of what is drawn over pictures. Text has a contrast of at least 7
+// to 1 on every ground it stands on, and disabled text 4.5 to 1 (WCAG 2.1, 1.4.6 and 1.4.3).
 
 /// sRGB with alpha, 0 to 1.
 using ThemeColour = std::array<float, 4>;
@@ -64,16 +65,16 @@ inline constexpr ThemeColour kActive{0.133f, 0.318f, 0.555f, 1};
 inline constexpr ThemeColour kError{0.482f, 0.098f, 0.118f, 1};
 inline constexpr ThemeColour kEdge{0.310f, 0.337f, 0.392f, 1};
 inline constexpr ThemeColour kAccent{0.357f, 0.659f, 1.0f, 1};
-inline constexpr ThemeColour kGrab{0.196f, 0.420f, 0.690f, 1};  // values stand on it
+inline constexpr ThemeColour kGrab{0.196f, 0.420f, 0.690f, 1};  // values are written on it
 
-/// Grounds that text stands on.
+/// The backgrounds on which text stands.
 inline constexpr std::array kGrounds{kWindow, kField, kButton, kHovered, kActive, kError};
 
 }  // namespace theme
 
-/// (L1 + 0.05) / (L2 + 0.05) of the relative luminances, the lighter first: 1 to 21.
+/// (L1 + 0.05) / (L2 + 0.05) for the relative luminances, the lighter one first: 1 to 21.
 double contrast(const ThemeColour& a, const ThemeColour& b);
-/// Puts them into the style of the current ImGui context, with distances at this scale.
+/// Puts the colours, and distances at this scale, into the style of the current ImGui context.
 void apply_theme(float scale);
 
 }  // namespace darb

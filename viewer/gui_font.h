@@ -6,7 +6,8 @@
 
 namespace darb {
 
-/// A TrueType file; empty where the package was missing: Dear ImGui has letters of its own.
+/// A TrueType file. It is empty where the package was missing; Dear ImGui then uses its own
+/// letters.
 std::span<const unsigned char> gui_font();
 
 }  // namespace darb

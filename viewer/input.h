@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Input: what mouse and keys did since the last frame, free of any window system.
+// Input: what mouse and keys did since the last frame, independent of any window system.
 #pragma once
 
 #include <algorithm>
@@ -19,8 +19,8 @@ enum class Key {
     next_camera,  // ]
     last_camera,  // [
     add_key,      // K
-    play,         // space: a path, or a training run that is paused
-    step,         // . : one step of a training run, which then pauses
+    play,         // space: plays a path, or goes on with a paused training run
+    step,         // . : does one step of a training run, which then pauses
     select_all,
     select_none,
     select_others,  // Ctrl A, D, I
@@ -47,20 +47,20 @@ enum class Key {
 
 struct Input {
     double x = 0, y = 0;    // px, pointer
-    double dx = 0, dy = 0;  // px that it moved with a button down, since the last frame
-    double wheel = 0;       // steps, up positive
-    // Down now or during that motion.
+    double dx = 0, dy = 0;  // px that it moved with a button down since the last frame
+    double wheel = 0;       // wheel steps, up is positive
+    // Whether each is down now or was during that motion.
     bool left = false, middle = false, right = false, shift = false, control = false;
     bool double_click = false;
-    std::vector<glm::dvec2> trail;  // px, where it was pressed and dragged with the left button
-    // Held: W S A D E Q.
+    std::vector<glm::dvec2> trail;  // px where it was pressed and dragged with the left button
+    // Keys that are held: W S A D E Q.
     bool ahead = false, back = false, to_left = false, to_right = false, rise = false, sink = false;
     std::vector<Key> pressed;
     std::vector<std::filesystem::path> dropped;
 };
 
 // Requests: what panels, keys and the window ask of the viewer. They wait in a queue, and the
-// viewer does them in order after the panels of a frame.
+// viewer carries them out in order after the panels of a frame.
 
 namespace request {
 
@@ -71,32 +71,32 @@ struct Frame {
 };
 struct TakePicture {};
 struct ChooseCamera {
-    int view = 0;  // of the data set
+    int view = 0;  // index into the data set
 };
 struct LeavePhoto {};
-struct FollowPlan {};  // the effects as they are planned
-struct Measure {};     // accuracy settings and effects
+struct FollowPlan {};  // sets the effects as planned
+struct Measure {};     // measures accuracy settings and effects
 struct ShowOpen {
     bool merges = false;
-};  // the dialog
+};  // opens the dialog
 struct Open {
     std::filesystem::path file;
-    bool merges = false;  // into the scene that is there
+    bool merges = false;  // adds it to the current scene
 };
 struct ShowEdits {};  // other splats are deleted, selected or moved now
-struct Save {};       // the edited scene
-struct SavePage {};   // the same as a web page
+struct Save {};       // saves the edited scene
+struct SavePage {};   // saves it as a web page
 struct LoadPath {};
 struct SavePath {};
 struct ExportPath {};
 struct CancelLoad {};
-struct CancelWork {};  // an export, a measurement
+struct CancelWork {};  // an export or a measurement
 struct Quit {};
-// Answers to the question of session.leaving.
+// Answers to the question that session.leaving asks.
 struct SaveAndLeave {};
 struct Leave {};
 struct Stay {};
-// For the window.
+// Requests for the window.
 struct ToggleFullScreen {};
 struct LeaveFullScreen {};
 
@@ -121,7 +121,7 @@ void take_back(RequestQueue& queue) {
     std::erase_if(queue, [](const Request& r) { return std::holds_alternative<Kind>(r); });
 }
 
-/// What is left to the window after a frame.
+/// What the window itself must do after a frame.
 enum class WindowRequest { toggle_full_screen, leave_full_screen, close };
 
 }  // namespace darb

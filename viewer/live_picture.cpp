@@ -12,9 +12,10 @@ namespace darb {
 
 namespace {
 
-constexpr double kDrawnShare = 0.1;    // of the time, that pictures may take from training
-constexpr double kBetween_s = 0.2;     // two pictures of splats that change
-constexpr double kUnchanged_s = 0.12;  // a wish, before the whole picture of it
+constexpr double kDrawnShare = 0.1;  // share of the time that pictures may take from training
+constexpr double kBetween_s = 0.2;   // time between two pictures of splats that change
+// time that a wish stays unchanged before its whole picture is drawn
+constexpr double kUnchanged_s = 0.12;
 
 }  // namespace
 
@@ -83,7 +84,7 @@ LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish, bool wh
     made.scene = live_scene(splats);
     made.whole = whole;
     made.quality = whole ? MotionQuality() : motion_.quality();
-    device_->wait_idle();  // for the run's own work: it is no part of the picture's time
+    device_->wait_idle();  // the run's own work does not count as the picture's time
     try {
         if (shown_ != &splats) picture_.set_live(splats, bounds_);
         shown_ = &splats;
@@ -112,7 +113,7 @@ LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish, bool wh
         made.visible = picture_.status().visible;
         made.intersections = picture_.status().intersections;
         made.ms = seconds_since(start) * 1000;
-    } catch (const DeviceLost&) {  // so it is for the run
+    } catch (const DeviceLost&) {  // the run gets the same error
         throw;
     } catch (const Error& e) {
         made.error = e.what();

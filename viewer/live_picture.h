@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Pictures of a training run in a window of another thread. The window says what it wants to see;
-// the run draws that on its own device between two iterations and hands the pixels over. So what
-// holds the run up for seconds (compiling, a probe, an evaluation) leaves the window alive: it
-// shows the last picture. A LivePicture may be used from both threads; a LiveDrawer is the run's.
+// Pictures of a training run in a window of another thread. The window says what it wants to see.
+// The run draws that on its own device between two iterations and hands the pixels over. While
+// something holds the run up for seconds (compiling, a probe, an evaluation), the window stays
+// alive and shows the last picture. Both threads may use a LivePicture; a LiveDrawer belongs to the
+// run.
 #pragma once
 
 #include <chrono>
@@ -27,7 +28,7 @@ struct LiveWish {
     bool operator==(const LiveWish& other) const;
 };
 
-/// Of the splats that are trained; how they are meant to be shown.
+/// How the splats that are being trained are meant to be shown.
 struct LiveScene {
     int kernel = 0, sh_degree = 0;
     Footprint footprint = Footprint::psi;
@@ -36,18 +37,18 @@ struct LiveScene {
 };
 LiveScene live_scene(const GpuSplats& splats);
 
-/// What the run made of it.
+/// What the run drew for a wish.
 struct LiveMade {
     std::vector<std::uint32_t> pixels;  // B8G8R8A8 [height][width]
     int width = 0, height = 0;          // px
     LiveScene scene;
-    bool whole = false;  // not one in motion
+    bool whole = false;  // false for a lesser picture in motion
     MotionQuality quality;
     std::vector<PassTime> passes;
-    double ms = 0;  // without what the run had under way
+    double ms = 0;  // without the work that the run had under way
     std::uint32_t visible = 0, intersections = 0;
-    int photo = -1;     // that was read; -1: none
-    std::string error;  // why there is no photo, or no picture
+    int photo = -1;     // the photo that was read; -1: none
+    std::string error;  // why there is no photo or no picture
     std::vector<double> psnr_db;
 };
 
@@ -68,16 +69,16 @@ class LivePicture {
     std::optional<LiveMade> made_;
 };
 
-/// Of the splats since the last picture; seldom: they change all the time, and not each change is
-/// to be drawn.
+/// How much the splats have changed since the last picture. `seldom`: they change all the time, and
+/// not every change is drawn.
 enum class LiveChange { none, seldom, at_once };
 
 class LiveDrawer {
   public:
     LiveDrawer(Device& device, std::vector<View> views, const Bounds& bounds);
 
-    /// A picture where one is due: a lesser one at once where the wish changed, the whole one when
-    /// it stays, and again as the splats change. Returns whether it drew.
+    /// Draws a picture where one is due: a lesser one as soon as the wish changes, the whole one
+    /// when it stays the same, and another as the splats change. Returns whether it drew.
     bool draw(const GpuSplats& splats, LiveChange change, LivePicture& to);
 
   private:
@@ -93,7 +94,7 @@ class LiveDrawer {
     MotionControl motion_;
     const GpuSplats* shown_ = nullptr;
     std::optional<LiveWish> drawn_;
-    bool whole_ = false, compiled_ = false;  // of the last picture
+    bool whole_ = false, compiled_ = false;  // about the last picture
     LiveClock::time_point drawn_at_, next_;
 };
 

@@ -19,7 +19,7 @@ glm::dmat3 rotation_about(const glm::dvec3& axis, double angle) {
     return glm::dmat3(glm::rotate(glm::dmat4(1.0), angle, axis));
 }
 
-// Rounding errors of many small turns add up otherwise.
+// Otherwise the rounding errors of many small turns would add up.
 void orthonormalise(glm::dmat3& axes) {
     axes[2] = glm::normalize(axes[2]);
     axes[0] = glm::normalize(axes[0] - glm::dot(axes[0], axes[2]) * axes[2]);
@@ -28,7 +28,7 @@ void orthonormalise(glm::dmat3& axes) {
 
 }  // namespace
 
-// Around `up` by to_right and around right by to_down, the latter cut at the poles.
+// Turns around `up` by to_right and around right by to_down, which stops at the poles.
 void Navigation::turn(double to_right, double to_down) {
     const double from_up = std::acos(std::clamp(glm::dot(forward(), up), -1.0, 1.0));
     const double wanted =
@@ -83,7 +83,8 @@ void Navigation::set_up(const glm::dvec3& new_up) {
     const glm::dvec3 to = glm::normalize(new_up), centre = pivot();
     glm::dvec3 axis = glm::cross(up, to);
     const double angle = std::atan2(glm::length(axis), glm::dot(up, to));
-    if (glm::length(axis) < 1e-9) axis = forward() - glm::dot(forward(), up) * up;  // a flip
+    // up was turned over
+    if (glm::length(axis) < 1e-9) axis = forward() - glm::dot(forward(), up) * up;
     if (glm::length(axis) < 1e-9) axis = right();
     axes = rotation_about(glm::normalize(axis), angle) * axes;
     up = to;
@@ -93,7 +94,7 @@ void Navigation::set_up(const glm::dvec3& new_up) {
 
 void Navigation::level() {
     glm::dvec3 side = glm::cross(forward(), up);
-    if (glm::length(side) < 1e-6) {  // straight up or down: any right will do
+    if (glm::length(side) < 1e-6) {  // where the view is straight up or down, any right will do
         side = right() - glm::dot(right(), up) * up;
         if (glm::length(side) < 1e-6) return;
     }
@@ -134,7 +135,8 @@ glm::dmat3 turn_to_up(const glm::dvec3& up) {
     const glm::dvec3 to(0, -1, 0);
     glm::dvec3 axis = glm::cross(up, to);
     const double sine = glm::length(axis);
-    axis = sine > 1e-12 ? axis / sine : glm::dvec3(1, 0, 0);  // a half turn, where it is opposite
+    // a half turn where the directions are opposite
+    axis = sine > 1e-12 ? axis / sine : glm::dvec3(1, 0, 0);
     return rotation_about(axis, std::atan2(sine, glm::dot(up, to)));
 }
 

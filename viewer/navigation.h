@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Navigation: where a viewer's camera is and how mouse and keys move it. Pure mathematics, no
-// window. The frame is that of Camera: x right, y down, z forward.
+// Navigation: where a viewer's camera is and how mouse and keys move it. It is pure mathematics,
+// without a window. The frame is that of Camera: x right, y down, z forward.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -13,7 +13,7 @@ namespace darb {
 struct Navigation {
     glm::dvec3 eye{0, 0, -3};  // world
     glm::dmat3 axes{1.0};      // columns: the camera's right, down and forward in the world
-    glm::dvec3 up{0, -1, 0};   // unit, world; what an orbit turns around
+    glm::dvec3 up{0, -1, 0};   // unit vector, world; orbits turn around it
     double distance = 3;       // world, from the eye to the pivot in front of it
     double fov_y = glm::radians(50.0);  // rad, full height
     double centre_x = 0.5;              // share of the window's width left of the optical axis
@@ -23,43 +23,45 @@ struct Navigation {
     glm::dvec3 forward() const { return axes[2]; }
     glm::dvec3 pivot() const { return eye + distance * forward(); }
 
-    /// Around the pivot: to_right turns around `up` so that the scene follows the hand, to_down
+    /// Orbits the pivot. to_right turns around `up` so that the scene follows the hand; to_down
     /// tilts and stops one degree before the poles. Radians.
     void orbit(double to_right, double to_down);
-    /// Turns the head, the eye stays. Radians.
+    /// Turns the head while the eye stays. Radians.
     void look(double to_right, double to_down);
-    /// Shifts the eye so that what is at the pivot's depth follows the pointer. Pixels of a window
-    /// of this height.
+    /// Shifts the eye so that what is at the pivot's depth follows the pointer. dx and dy are
+    /// pixels of a window of this height.
     void pan(double dx_px, double dy_px, int height_px);
-    /// The pivot stays, its distance is multiplied by factor > 0.
+    /// Multiplies the distance to the pivot by factor > 0; the pivot stays.
     void zoom(double factor);
-    /// World units along right, up (of the camera) and forward: W goes where one looks.
+    /// Moves along the camera's right, up and forward, in world units: W goes where one looks.
     void fly(const glm::dvec3& right_up_forward);
-    /// The sphere fills the smaller side of a window; direction and horizon stay.
+    /// Frames the sphere so that it fills the smaller side of a window; direction and horizon stay.
     void frame(const glm::dvec3& centre, double radius, double aspect);
     /// Looks at the centre from this distance; direction and horizon stay.
     void look_from(const glm::dvec3& centre, double distance);
-    /// A new pivot in the direction of `point`, without turning: only its distance changes.
+    /// Sets a new pivot in the direction of `point`; the camera does not turn, only the distance
+    /// changes.
     void set_pivot_depth(const glm::dvec3& point);
-    /// New world up: around the pivot the camera turns along with it, so that it goes on looking as
-    /// far above or below the horizon, which becomes level.
+    /// Sets a new world up. The camera turns along with it around the pivot, so that it still looks
+    /// as far above or below the horizon, which becomes level.
     void set_up(const glm::dvec3& new_up);
-    /// Takes roll away: right becomes perpendicular to up.
+    /// Removes roll: right becomes perpendicular to up.
     void level();
-    /// Pose and field of view of a photo's camera.
+    /// Takes pose and field of view from a photo's camera.
     void take(const Camera& camera);
-    /// The pinhole for a window, principal point at half its height and centre_x of its width.
+    /// The pinhole camera for a window, with its principal point at half the height and centre_x of
+    /// the width.
     Camera camera(int width_px, int height_px) const;
 
   private:
     void turn(double to_right, double to_down);
 };
 
-/// Unit vector of x, -x, y, -y, z, -z. Throws Error for other names.
+/// The unit vector for x, -x, y, -y, z or -z. Throws Error for other names.
 glm::dvec3 up_from_name(const std::string& name);
-/// The shortest turn of the world that takes `up`, of unit length, to -y.
+/// The shortest turn of the world that takes `up`, a unit vector, to -y.
 glm::dmat3 turn_to_up(const glm::dvec3& up);
-/// Name of the axis nearest to a direction.
+/// The name of the axis nearest to a direction.
 std::string up_name(const glm::dvec3& up);
 
 }  // namespace darb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The pictures of a scene, each frame's as its pacing wants it, and what they cost.
+// Makes the pictures of a scene as each frame's pacing wants them, and measures what they cost.
 #include "viewer/painter.h"
 
 #include <algorithm>
@@ -16,11 +16,11 @@ namespace darb {
 
 namespace {
 
-constexpr double kLong_ms = 500;            // for a whole picture
-constexpr std::size_t kFewSplats = 20'000;  // half of them are always drawn
-constexpr double kQuick_ms = 20;            // it will be drawn in motion, too
-constexpr size_t kTimesKept = 60;           // frames in motion that the panel averages over
-constexpr int kRehearsals = 9;              // of motion; the first compiles
+constexpr double kLong_ms = 500;            // more is long for a whole picture
+constexpr std::size_t kFewSplats = 20'000;  // half of so few splats are always drawn
+constexpr double kQuick_ms = 20;            // quick enough to be drawn in motion, too
+constexpr size_t kTimesKept = 60;           // frames in motion over which the panel averages
+constexpr int kRehearsals = 9;              // rehearsals of motion; the first one compiles
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
     return 1000 * seconds_since(start);
@@ -73,7 +73,7 @@ void Painter::begin_motion() {
     pacing_.motion().start(shares_);
 }
 
-// Until the warm-up is over the run's last picture stays, and the window lives.
+// Until the warm-up is over, the run's last picture stays and the window remains usable.
 void Painter::begin_scene(bool of_run) {
     constexpr int kSize = 256;  // px
     if (of_run && options_.second_device && live_.size.x > 0)
@@ -91,7 +91,7 @@ void Painter::end_warm_up() {
     pacing_.forget();
 }
 
-// The frames of an export, and the pictures of a measurement, are of one scene.
+// All frames of an export, and all pictures of a measurement, show one scene.
 void Painter::lose_scene(const char* why) {
     const std::string note = work_.lose_scene(why);
     if (!note.empty()) session_->tell(note);
@@ -99,7 +99,7 @@ void Painter::lose_scene(const char* why) {
     ++version_;
 }
 
-// While a hand moves splats, only they are made anew; all else follows when it lets go.
+// While a hand moves splats, only those are updated; everything else follows when it lets go.
 void Painter::show_edits() {
     const Edit& edit = session_->edit;
     const Scene& scene = *session_->scene;
@@ -117,11 +117,12 @@ void Painter::show_edits() {
     show_marks(!work_.draws());
 }
 
-// The highlight of a selection is for who edits: not in pictures that are written or measured.
+// The highlight of a selection is for the user who edits, so pictures that are written or measured
+// have none.
 void Painter::show_marks(bool highlight) {
     const Edit& edit = session_->edit;
     highlights_ = highlight;
-    lose_levels();  // they have none
+    lose_levels();  // levels have no marks
     ++version_;
     picture_.set_marks(edit.unseen(),
                        highlight ? edit.selected() : SplatMask(edit.selected().size(), 0));
@@ -154,7 +155,7 @@ void Painter::begin(int width, int height) {
     take_psnr();
     take_levels();
     if (warm_up_ && warm_up_->done()) end_warm_up();
-    if (at_rest()) warm_pipelines_.clear();  // the pictures have them
+    if (at_rest()) warm_pipelines_.clear();  // the pictures own them now
     canvas_.resize(width, height);
     gui_.begin(width, height);
 }
@@ -162,7 +163,7 @@ void Painter::begin(int width, int height) {
 void Painter::paint(const PaintedFrame& frame) {
     const bool works = work_.draws();
     step_work();
-    if (!frame.of_run) load_current_photo();  // of a run whoever draws reads it
+    if (!frame.of_run) load_current_photo();  // for a run, whoever draws reads it
     pacing_.skip();
     if (!frame.of_run && !picture_.empty() && !warm_up_) pace_picture(frame, works);
 }
@@ -199,11 +200,12 @@ void Painter::compose() {
                     [this](VkCommandBuffer commands) { gui_.draw(commands); });
 }
 
-// Where a picture in motion cannot have all splats. Another scene and edits end them.
+// Levels are made where a picture in motion cannot have all splats. Another scene or an edit ends
+// them.
 void Painter::start_levels() {
     if (levels_ || !session_->scene || shares_.empty() || !pacing_.is_whole()) return;
     if (session_->edit.selected_count() > 0 || session_->edit.transforms())
-        return;  // they have none
+        return;  // levels show no selection and no drag
     if (pacing_.motion().quality().splats == 1 || session_->times.full_ms < kQuick_ms) return;
     const Scene& s = *session_->scene;
     if (s.model.size() < kFewSplats) return;
@@ -220,7 +222,7 @@ void Painter::take_levels() {
     const bool done = levels_->done();
     try {
         while (const std::optional<SplatModel> level = levels_->take()) picture_.add_level(*level);
-    } catch (const NoRoom&) {  // no room: the important splats do without it
+    } catch (const NoRoom&) {  // the important splats do without levels
         levels_->cancel();
     }
     if (done) picture_.end_levels();
@@ -304,7 +306,7 @@ BufferPicture Painter::drawn() const {
     return {&picture_.pixels(), picture_.width(), picture_.height()};
 }
 
-// All but the whole one are replaced soon.
+// All pictures but the whole one are replaced soon.
 void Painter::draw_picture(const PictureKey& key, PictureStep step, bool wait) {
     const bool whole = step == PictureStep::whole;
     const MotionQuality quality = whole ? MotionQuality()
@@ -314,7 +316,7 @@ void Painter::draw_picture(const PictureKey& key, PictureStep step, bool wait) {
     const Camera camera = at_scale(key.camera, quality.scale);
     const bool refines = !pacing_.refined();
     pacing_.drew(step, quality);
-    if (step == PictureStep::in_motion) rehearsals_ = 0;  // it measures the same
+    if (step == PictureStep::in_motion) rehearsals_ = 0;  // a picture in motion measures the same
     const WindowArea area = free_area(*session_, key.camera.width, key.camera.height);
     const PaneWish wish =
         wish_for(camera, area, whole ? std::nullopt : std::optional(quality.splats));
@@ -333,7 +335,7 @@ void Painter::draw_picture(const PictureKey& key, PictureStep step, bool wait) {
         under_way_.push_back(std::move(started));
 }
 
-// Whether it could be: else it is said why.
+// Returns whether the picture could be made; otherwise it says why not.
 bool Painter::make_picture(const PaneWish& wish, Started& started, bool wait) {
     started.begun = Clock::now();
     shows_panes_ = wish.several();  // also where it fails
@@ -358,7 +360,7 @@ void Painter::take_results() {
     for (StartedPicture& made : picture_.take_done()) {
         const auto of = std::find_if(under_way_.begin(), under_way_.end(),
                                      [&](const Started& s) { return s.frame == made.frame; });
-        if (of == under_way_.end()) continue;  // of a scene before
+        if (of == under_way_.end()) continue;  // it belongs to an earlier scene
         add_times(made.passes, of->made.passes);
         of->made.status = made.status;
         of->made.whole &= made.whole;
@@ -380,7 +382,7 @@ void Painter::take_result(const Started& started) {
         if (!rehearsal && last) pacing_.failed();
         return;
     }
-    if (!started.made.whole) {  // again, now that there is room
+    if (!started.made.whole) {  // draws it again, now that there is room
         if (rehearsal) ++rehearsals_;
         if (!rehearsal && last) pacing_.miss();
         return;
@@ -388,7 +390,7 @@ void Painter::take_result(const Started& started) {
     const std::vector<PassTime>& passes = started.made.passes;
     const double ms = passes.empty() ? milliseconds_since(started.begun) : sum_ms(passes);
     if (!rehearsal) note_picture(started, ms);
-    // Another quality was chosen since: nothing is learnt of it.
+    // Another quality has been chosen since, so this time teaches nothing.
     if (!started.counts || !(started.quality == pacing_.motion().quality())) return;
     if (rehearsal)
         pacing_.motion().measured(motion_cost(besides_picture_ms_ + ms, passes));
@@ -418,14 +420,14 @@ void Painter::take_psnr() {
     pacing_.unsettle();
 }
 
-// After what a picture needs has changed: pipelines compile at their first use, and the first
-// frames in motion are drawn at a quality that was found before them.
+// Runs after something that a picture needs has changed. Pipelines compile at their first use, and
+// the first frames in motion are drawn at a quality that these rehearsals found.
 void Painter::rehearse_motion(const PictureKey& key) {
     const bool first = rehearsals_ == kRehearsals;
     const FrameTimes& t = session_->times;
     if (first) besides_picture_ms_ = std::max(0.0, t.frame_ms - t.picture_ms);
     const MotionQuality quality = pacing_.motion().quality();
-    // The first makes the copy of the important splats, also where all are wanted now.
+    // The first rehearsal makes the copy of the important splats, even where all are wanted now.
     const double splats = first ? std::min(quality.splats, picture_.most_moving()) : quality.splats;
     const std::vector<DisplaySettings> displays = shown_displays();
     Started started{
@@ -455,12 +457,13 @@ void Painter::presented() {
             if (t.moving_ms.size() > kTimesKept) t.moving_ms.pop_front();
         }
     }
-    take_results();  // some drivers present when all is done, lavapipe among them
+    take_results();  // some drivers, such as lavapipe, present only when all is done
 }
 
 std::optional<ImageU8> Painter::picture_alone(int width, int height, bool of_run) {
     if (!of_run) {
-        if (session_->edit.selected_count() > 0) show_marks(false);  // until step_work
+        // until step_work shows them again
+        if (session_->edit.selected_count() > 0) show_marks(false);
         const WindowArea area = free_area(*session_, width, height);
         const Camera camera = camera_in_window(session_->photos, session_->navigation, area);
         const PaneWish wish = wish_for(camera, area, {});
@@ -470,7 +473,8 @@ std::optional<ImageU8> Painter::picture_alone(int width, int height, bool of_run
         if (shows_panes_) panes_.compose(session_->panes);
     }
     const BufferPicture taken = of_run ? shown() : drawn();
-    if (taken.pixels == nullptr || taken.width == 0) return {};  // of a run that has drawn none
+    // the run has not drawn a picture yet
+    if (taken.pixels == nullptr || taken.width == 0) return {};
     return read_pixels(*taken.pixels, taken.width, taken.height);
 }
 
@@ -490,13 +494,13 @@ void Painter::step_export(bool wait) {
     const std::optional<std::string> summary = work_.step_export(picture_, wait);
     if (!summary) return;
     session_->tell(*summary);
-    pacing_.unsettle(PicturePacing::kSettlingFrames + 1);  // the panels say so
+    pacing_.unsettle(PicturePacing::kSettlingFrames + 1);  // the panels report it
 }
 
 void Painter::step_work() {
     if (highlights_ == work_.draws() && session_->edit.selected_count() > 0)
         show_marks(!work_.draws());
-    if (work_.draws()) {  // the picture is one of its own then
+    if (work_.draws()) {  // the picture then belongs to the work
         pacing_.forget();
         shows_panes_ = false;
     }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Painter: how it is painted. Pictures of the scene, whole ones and those in motion, the panels
-// over them, and the canvas that takes both; what it needs of the device, and when it draws.
+// Painter: how the session is painted. It makes the pictures of the scene, whole ones and those in
+// motion, draws the panels over them, and owns the canvas that takes both. It decides when to draw
+// and what it needs of the device.
 //
-// Two frames are under way at a time. A frame starts its picture, and what it took, which decides
-// how good the next ones are, is known one or two frames later.
+// Two frames are under way at a time. A frame starts its picture, and the time that the picture
+// took, which decides how good the next ones are, is known one or two frames later.
 #pragma once
 
 #include <array>
@@ -28,20 +29,20 @@ namespace darb {
 
 struct PainterOptions {
     float gui_scale = 1;
-    /// Called from other threads when there is something to show.
+    /// Called from other threads when there is something new to show.
     std::function<void()> wake;
-    /// Of a device like this one, to compile on while the last picture of a run is shown.
+    /// A device like this one, which compiles while the last picture of a run is shown.
     std::optional<DeviceOptions> second_device;
 };
 
 /// What paint needs to know of a frame.
 struct PaintedFrame {
     int width = 0, height = 0;  // px
-    bool full = false;          // the whole picture at once, no lesser one in motion
-    bool of_run = false;        // its pictures are shown, not the scene's
+    bool full = false;          // draws the whole picture at once, without a lesser one in motion
+    bool of_run = false;        // shows the run's pictures instead of the scene's
 };
 
-/// The last picture of a run. Frames under way may still read those before it.
+/// The last picture of a run. Frames under way may still read earlier ones.
 struct LivePixels {
     std::array<Buffer, kFramesUnderWay + 1> buffers;
     std::size_t at = 0;
@@ -53,60 +54,60 @@ struct LivePixels {
 
 class Painter {
   public:
-    /// window: null without one.
+    /// window: null for none.
     Painter(Device& device, Session& session, PainterOptions options, GLFWwindow* window);
     ~Painter();
     Painter(const Painter&) = delete;
     Painter& operator=(const Painter&) = delete;
 
-    /// Another scene's splats; the scene stays where it is as long as it is shown. Where it throws,
-    /// those before are still there.
+    /// Uploads another scene, which must stay where it is as long as it is shown. Where this
+    /// throws, the previous splats are still there.
     void open(const Scene& scene);
-    /// After `open`, once the session has the scene. of_run: the last picture of a run is shown,
-    /// and stays until pictures of the scene have nothing to compile.
+    /// Called after `open`, once the session has the scene. of_run: the last picture of a run is
+    /// shown and stays until pictures of the scene have nothing left to compile.
     void begin_scene(bool of_run);
-    /// Edits are seen: other splats are deleted, selected or moved now. Throws Error.
+    /// Shows edits: other splats are deleted, selected or moved now. Throws Error.
     void show_edits();
-    /// A run is shown from now on, by the pictures that it makes.
+    /// From now on shows the pictures that a run makes.
     void begin_run();
     void show_picture_of_run(const LiveMade& made);
 
-    /// Starts a frame, the panels' as well: waits for the one before the last, and takes what
-    /// became of the pictures that are done. Throws DeviceLost.
+    /// Starts a frame, the panels' as well. Waits for the frame before the last and takes the
+    /// results of the pictures that are done. Throws DeviceLost.
     void begin(int width, int height);
     Gui& gui() { return gui_; }
-    /// The picture where something it depends on changed.
+    /// Draws the picture where something that it depends on has changed.
     void paint(const PaintedFrame& frame);
-    /// Records the canvas's commands: the picture, the panels over it. The caller runs them.
+    /// Records the canvas's commands: the picture with the panels over it. The caller runs them.
     void compose();
-    /// The canvas was shown: the whole frame's time is known.
+    /// To be called when the canvas was shown and the whole frame's time is known.
     void presented();
-    /// Seconds until a frame is wanted for the picture's sake; infinity where none is.
+    /// Seconds until the picture needs a frame; infinity where it needs none.
     double seconds_to_next();
 
-    /// Frames for the panels alone, which show something new.
+    /// Asks for frames for the panels alone, because they show something new.
     void unsettle() { pacing_.unsettle(); }
-    /// Panels have found their size and show the picture's times.
+    /// Whether the panels have found their size and show the picture's times.
     bool settled() const { return pacing_.settled(); }
-    /// The picture is to be drawn again.
+    /// Makes the next frame draw the picture again.
     void forget() { pacing_.forget(); }
-    /// It has all pixels, and the most important splats at least.
+    /// Whether the picture has all pixels, and at least the most important splats.
     bool refined() const;
-    /// It is whole, and one in motion would have nothing to wait for.
+    /// Whether the picture is whole and one in motion would not have to wait for anything.
     bool at_rest() const;
-    /// No levels of merged splats for motion are being made.
+    /// Whether no levels of merged splats for motion are still being made.
     bool levels_ready() const { return picture_.levels_ended() || !levels_; }
 
-    /// What is seen, without panels and highlights. of_run: of the run that is shown; null where
-    /// there is no picture yet. Waits.
+    /// What is seen, without panels and highlights. of_run: takes the picture of the run that is
+    /// shown; null where there is none yet. Waits.
     std::optional<ImageU8> picture_alone(int width, int height, bool of_run);
-    /// Exports and measurements, which draw pictures of their own. Throws Error.
+    /// Exports and measurements draw pictures of their own. Throws Error.
     void start_export();
     void start_measure(int width, int height);
     void cancel_work() { work_.cancel(); }
     bool draws_work() const { return work_.draws(); }
     bool exports() const { return work_.exports(); }
-    /// A step of an export; wait: for the video, too. Throws Error.
+    /// Does a step of an export; wait: waits for the video, too. Throws Error.
     void step_export(bool wait);
 
     Canvas& canvas() { return canvas_; }
@@ -114,16 +115,16 @@ class Painter {
 
   private:
     using Clock = std::chrono::steady_clock;
-    struct Started {  // pictures of a frame, of which it is not known yet what became of them
+    struct Started {  // pictures of a frame whose outcome is not known yet
         int frame = 0;
         PictureStep step = PictureStep::none;
         MotionQuality quality;
         bool refines = false;      // the picture before it had fewer pixels
-        bool counts = true;        // its time says something: it built nothing
-        std::size_t pictures = 1;  // that are not done
-        StartedPicture made;       // of those that are
+        bool counts = true;        // whether its time counts: nothing was built for it
+        std::size_t pictures = 1;  // how many are not done
+        StartedPicture made;       // the result of those that are
         Clock::time_point begun{};
-        double frame_ms = 0;  // of the frame; 0: it was not shown
+        double frame_ms = 0;  // time of the frame; 0: it was not shown
     };
     void take_results();
     void take_result(const Started& started);
@@ -135,13 +136,13 @@ class Painter {
     void show_marks(bool highlight);
     void load_current_photo();
     void pace_picture(const PaintedFrame& frame, bool works);
-    std::vector<DisplaySettings> shown_displays() const;  // a pane each
+    std::vector<DisplaySettings> shown_displays() const;  // one for each pane
     PaneWish wish_for(const Camera& camera, const WindowArea& area,
                       std::optional<double> moving) const;
     void fit_panes();
     bool ready_to_move() const;
     BufferPicture shown() const;
-    BufferPicture drawn() const;  // of the scene, while the run's last picture is still shown too
+    BufferPicture drawn() const;  // the scene's, even while the run's last picture is shown
     void draw_picture(const PictureKey& key, PictureStep step, bool wait);
     bool make_picture(const PaneWish& wish, Started& started, bool wait);
     void rehearse_motion(const PictureKey& key);
@@ -157,24 +158,24 @@ class Painter {
     Gui gui_;
     SplatPicture picture_;
     PanePictures panes_;
-    bool shows_panes_ = false;  // not picture_
+    bool shows_panes_ = false;  // shows the panes rather than picture_
     LivePixels live_;
     PicturePacing pacing_;
     int frame_ = 0;                  // number of this one
-    std::deque<Started> under_way_;  // by their frames
-    bool copies_wanted_ = false;     // of the panes' pictures, with this frame
-    int psnr_at_ = 0;                // the frame in which they are there; 0: none are made
-    int rehearsals_ = 0;             // of motion, still to come
-    double besides_picture_ms_ = 0;  // what a frame took beside its picture, before them
+    std::deque<Started> under_way_;  // in the order of their frames
+    bool copies_wanted_ = false;     // copy the panes' pictures with this frame
+    int psnr_at_ = 0;                // the frame in which the copies are there; 0: none are made
+    int rehearsals_ = 0;             // rehearsals of motion that are still to come
+    double besides_picture_ms_ = 0;  // what an earlier frame took beside its picture
     PictureWork work_;
-    int shown_model_ = 0, shown_edit_ = 0;  // Edit::model_version, seen_version of the picture
-    std::vector<double> shares_;            // of the splats in motion, below all
-    std::unique_ptr<MotionLevels> levels_;  // of the scene; null: none asked for
-    std::vector<std::unique_ptr<MotionLevels>> ended_;  // cancelled, their threads still run
-    std::unique_ptr<WarmUp> warm_up_;                   // the run's last picture is shown
-    std::vector<Pipeline> warm_pipelines_;              // that it made, until pictures have them
-    int version_ = 0;                                   // of the scene and its edits
-    bool highlights_ = true;                            // what is selected, in the picture
+    int shown_model_ = 0, shown_edit_ = 0;  // Edit::model_version and seen_version of the picture
+    std::vector<double> shares_;            // shares of the splats for motion, all below 1
+    std::unique_ptr<MotionLevels> levels_;  // null: none asked for
+    std::vector<std::unique_ptr<MotionLevels>> ended_;  // cancelled ones whose threads still run
+    std::unique_ptr<WarmUp> warm_up_;                   // while the run's last picture is shown
+    std::vector<Pipeline> warm_pipelines_;              // made by it, kept until pictures have them
+    int version_ = 0;                                   // counts changes of the scene and its edits
+    bool highlights_ = true;  // whether the picture highlights the selection
     Clock::time_point frame_start_;
 };
 

@@ -48,14 +48,14 @@ void PanePictures::start(int frame, SplatPicture& picture, const PaneWish& wish)
     }
 }
 
-// Buffers are made anew only while nothing under way has them.
+// Buffers are replaced only while nothing under way uses them.
 void PanePictures::prepare(const SplatPicture& picture, const PaneWish& wish) {
     composed_.reset();
     pass_times_.clear();
     picture_ = &picture;
     photo_.reset();
     photo_first_ = wish.photo_first;
-    count_ = 0;  // where one has no room
+    count_ = 0;  // stays 0 where a picture has no room
     compiled_ = wish.several() && !strips_;
     if (!wish.several()) return;
     const SpecConstants threads{{"THREADS", VIEW_GROUP}};
@@ -96,7 +96,7 @@ void PanePictures::record_photo(Commands& commands) {
     photo_.reset();
 }
 
-// Where the photo has nothing, the picture beside it is seen, darker.
+// Where the photo has no pixels, the picture beside it shows through, darker.
 void PanePictures::record(Commands& commands, const Panes& panes) {
     const Layout layout{panes.lines, panes.difference, panes.difference_max};
     if (count_ < 2 || composed_ == layout) return;

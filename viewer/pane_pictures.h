@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PanePictures: the pictures of panes, the photo's among them, and the strips of them that a window
-// shows. Moving a line draws no splats.
+// PanePictures: the pictures of the panes, with the photo among them, and the strips of them that a
+// window shows. Moving a line between panes draws no splats.
 #pragma once
 
 #include <map>
@@ -12,7 +12,8 @@
 
 namespace darb {
 
-/// Pictures from one camera, a display each. photo_first: before them the photo, which is there.
+/// Pictures from one camera, one for each display. photo_first: the photo, which is there, comes
+/// first.
 struct PaneWish {
     Camera camera;
     std::vector<DisplaySettings> displays;
@@ -27,29 +28,30 @@ class PanePictures {
   public:
     explicit PanePictures(Device& device);
 
-    /// What is wished for, in the panes of `picture`. Waits. Throws Error.
+    /// Renders the wish into the panes of `picture`. Waits. Throws Error.
     void render(SplatPicture& picture, const PaneWish& wish);
-    /// The same as a part of this frame, without waiting. Where there are several pictures,
+    /// Does the same as a part of this frame, without waiting. Where there are several pictures,
     /// `record` belongs to the frame, too.
     void start(int frame, SplatPicture& picture, const PaneWish& wish);
-    /// The strips of several, as they are asked for; nothing where they are so already.
+    /// Copies the strips of several pictures as `panes` asks; does nothing where they are there
+    /// already.
     void record(Commands& commands, const Panes& panes);
-    /// The same, and waits. copies: with record_copies.
+    /// Does the same and waits. copies: also calls record_copies.
     void compose(const Panes& panes, bool copies = false);
-    /// Copies the pictures for psnr_db, which is right once these commands are done.
+    /// Copies the pictures for psnr_db, which is valid once these commands are done.
     void record_copies(Commands& commands);
-    /// Each against the first; see Panes.
+    /// Compares each picture with the first; see Panes.
     std::vector<double> psnr_db() const;
 
-    /// Of several, the photo counted.
+    /// How many pictures there are, with the photo.
     std::size_t count() const { return count_; }
     /// What compose made.
     const Buffer& pixels() const { return pixels_; }
     int width() const { return size_.x; }
     int height() const { return size_.y; }
-    /// Of what was rendered last, summed over the pictures.
+    /// Times of what was rendered last, summed over the pictures.
     const std::vector<PassTime>& pass_times() const { return pass_times_; }
-    /// Something was built for the last ones.
+    /// Whether something was built for the last pictures.
     bool compiled() const { return compiled_; }
 
   private:
@@ -69,20 +71,20 @@ class PanePictures {
     const SplatPicture* picture_ = nullptr;
     std::size_t count_ = 0;
     bool photo_first_ = false;
-    std::optional<PhotoOverlay> photo_;  // to be drawn
+    std::optional<PhotoOverlay> photo_;  // the photo that is to be drawn
     DisplaySettings photo_display_;
     Buffer photo_pixels_, pixels_;  // B8G8R8A8 [height][width]
-    std::vector<Buffer> copies_;    // of the pictures, for the host
+    std::vector<Buffer> copies_;    // the pictures' copies for the host
     glm::ivec2 size_{0};            // px
     std::optional<Layout> composed_;
     std::vector<PassTime> pass_times_;
     bool compiled_ = false;
 };
 
-/// What the pictures of the kernels show: the first the display as it is.
+/// The displays of the panes, one for each kernel; the first is the display as it is.
 std::vector<DisplaySettings> pane_displays(const DisplaySettings& display,
                                            const std::vector<int>& kernels_beside);
-/// Adds the times of passes to those of the same name.
+/// Adds the times of passes to the sums under the same names.
 void add_times(const std::vector<PassTime>& more, std::vector<PassTime>& sum);
 
 }  // namespace darb

@@ -29,7 +29,7 @@ namespace {
 constexpr std::string_view kFirstLine =
     "Written by darb view --export, which replaces and deletes these files alone:\n";
 
-// Links are not followed: what they lead to is not in this folder.
+// Links are not followed, because their targets are not in this folder.
 bool is_plain_file(const fs::path& path) {
     std::error_code none;
     return fs::symlink_status(path, none).type() == fs::file_type::regular;
@@ -72,7 +72,7 @@ ExportFolder::ExportFolder(fs::path folder, std::int64_t frames) : folder_(std::
     if (is_missing(folder_ / kList)) write_list();
 }
 
-// Whether there is one.
+// Returns whether there is a list.
 bool ExportFolder::check_list() const {
     const fs::path file = folder_ / kList;
     if (is_missing(file)) return false;
@@ -98,18 +98,18 @@ void ExportFolder::check_free(const std::string& name) const {
     const fs::path file = folder_ / name;
     if (is_missing(file) || is_ours(name)) return;
     throw Error(file.string(),
-                is_plain_file(file) ? fmt::format("is there, and {} does not say that an export "
+                is_plain_file(file) ? fmt::format("exists, and {} does not say that an export "
                                                   "wrote it",
                                                   kList)
-                                    : "is there, and is not a file that an export wrote",
-                "Choose another folder, or move it away: an export replaces its own files alone.");
+                                    : "exists, and is not a file that an export wrote",
+                "Choose another folder, or move it away: an export replaces only its own files.");
 }
 
 fs::path ExportFolder::claim(const std::string& name) {
     check_free(name);
     const fs::path list = folder_ / kList;
     if (listed_.contains(name)) return folder_ / name;
-    // Appended, not rewritten: a line a frame, and all of them are there when the export is killed.
+    // Each frame appends a line, so that the list is complete even when the export is killed.
     const int file = ::open(list.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | O_NOFOLLOW);
     const std::string line = name + '\n';
     const bool written =
@@ -150,7 +150,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Over nine hours at 30 frames a second; more is a mistake in the times.
+// This is over nine hours at 30 frames a second; more is a mistake in the times.
 constexpr double kMostFrames = 1'000'000;
 
 std::int64_t count_frames(const CameraPath& path, int fps) {
@@ -207,7 +207,7 @@ void PathExport::step(const Render& render, bool wait) {
 void PathExport::start_video() {
     summary_ = fmt::format("{} frames in {}", frames_, folder_.path().string());
     const fs::path unfinished = folder_.claim(ExportFolder::kUnfinishedVideo);
-    // yuv420p, which every player shows, needs even sizes.
+    // yuv420p, which every player can show, needs even sizes.
     std::vector<std::string> words{"ffmpeg",
                                    "-nostdin",
                                    "-y",
@@ -243,7 +243,7 @@ void PathExport::start_video() {
     }
 }
 
-// Whether it has ended.
+// Returns whether it has ended.
 bool PathExport::wait_for_ffmpeg(int& status, bool wait) const {
     pid_t ended = -1;
     do ended = waitpid(ffmpeg_, &status, wait ? 0 : WNOHANG);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PathExport: a camera path as numbered PNG frames, one frame a call so that a window stays alive,
-// and then a video where ffmpeg is installed.
+// PathExport: writes a camera path as numbered PNG frames, one frame a call so that a window stays
+// alive, and then as a video where ffmpeg is installed.
 #pragma once
 
 #include <sys/types.h>
@@ -27,19 +27,20 @@ class ExportFolder {
     static constexpr const char* kVideo = "video.mp4";
     static constexpr const char* kUnfinishedVideo = "video.mp4.tmp";
 
-    /// Reads the list of an earlier export, where there is one. Throws Error where a file of the
-    /// list's name is something else, and where a name that an export of so many frames writes is
-    /// somebody else's: not on the list, a link, a folder. Makes the folder where it is missing.
+    /// Reads the list of an earlier export, where there is one, and makes the folder where it is
+    /// missing. Throws Error where a file with the list's name is something else, and where a name
+    /// that an export of so many frames writes is taken: the file is not on the list, or it is a
+    /// link or a folder.
     ExportFolder(std::filesystem::path folder, std::int64_t frames);
 
-    /// Puts a name on the list before it is written. Throws Error where that is somebody else's, or
-    /// where the list cannot be written.
+    /// Puts a name on the list before it is written. Throws Error where the name is taken by a file
+    /// that no export wrote, or where the list cannot be written.
     std::filesystem::path claim(const std::string& name);
-    /// The finished video takes its name.
+    /// Gives the finished video its name.
     void keep_video();
     void drop_unfinished_video() const;
-    /// Deletes the frames of an earlier export from number `frames` on, and takes what is no longer
-    /// there from the list.
+    /// Deletes the frames of an earlier export from number `frames` on, and takes names that are no
+    /// longer there from the list.
     void finish(std::int64_t frames);
 
     const std::filesystem::path& path() const { return folder_; }
@@ -58,12 +59,12 @@ struct ExportOptions {
     std::filesystem::path folder;
     int fps = 30;               // frames a second, 1 at least
     int width = 0, height = 0;  // px of every frame
-    DisplaySettings display;    // of every frame; without a photo there is no error to show
+    DisplaySettings display;    // for every frame; without a photo there is no error to show
 };
 
 class PathExport {
   public:
-    /// The last key is shown, too. Throws Error for a path without keys or of more than a million
+    /// The last key is shown, too. Throws Error for a path without keys or with more than a million
     /// frames, for less than one frame a second, and for a folder that holds files of these names
     /// that no export wrote.
     PathExport(CameraPath path, const ExportOptions& options);
@@ -75,14 +76,14 @@ class PathExport {
     std::int64_t written() const { return next_; }
     double share() const { return double(next_) / double(frames_ + 1); }
     bool done() const { return done_; }
-    /// All frames are there; what is left is ffmpeg's.
+    /// Whether all frames are there, so that only ffmpeg's part is left.
     bool has_frames() const { return next_ >= frames_; }
-    /// The next frame: `render` gives the picture of a camera. After the last, starts ffmpeg (and
-    /// deletes frames with higher numbers that an earlier export wrote), and then looks whether
-    /// it has ended, or waits for that.
+    /// Writes the next frame; `render` gives the picture of a camera. After the last frame it
+    /// starts ffmpeg and deletes frames with higher numbers that an earlier export wrote. Further
+    /// calls look whether ffmpeg has ended, or wait for that.
     using Render = std::function<ImageU8(const Camera&, const DisplaySettings&)>;
     void step(const Render& render, bool wait = false);
-    /// What came out, for the user.
+    /// Tells the user what was written.
     const std::string& summary() const { return summary_; }
 
   private:

@@ -57,7 +57,7 @@ void load_photo_of_view(Device& device, Photos& photos) {
     std::vector<std::uint32_t> texels(photo.data.size() / 4);
     std::memcpy(texels.data(), photo.data.data(), photo.data.size());
     Buffer buffer(device, "photo", texels.size() * 4);
-    buffer.upload(texels);  // after what reads the one before
+    buffer.upload(texels);  // ordered after what reads the previous photo
     photos.buffer = std::move(buffer);
     photos.width = photo.width;
     photos.height = photo.height;

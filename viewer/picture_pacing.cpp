@@ -20,9 +20,10 @@ namespace darb {
 namespace {
 
 constexpr int kSlowFrames = 2, kQuickFrames = 12;
-constexpr double kAim = 0.85, kRoom = 0.7;   // of the target: what a change aims at; room for more
-constexpr double kMostUp = 2;                // factor of one change
-constexpr double kPixelsWeight = 2.5;        // in the error
+// shares of the target: what a change aims at, and what counts as room for more
+constexpr double kAim = 0.85, kRoom = 0.7;
+constexpr double kMostUp = 2;                // largest factor of one change
+constexpr double kPixelsWeight = 2.5;        // weight of the pixels in the error
 constexpr int kScales = 8, kLeastScale = 2;  // eighths
 constexpr double kLeastSplats = 10'000;
 
@@ -59,17 +60,18 @@ void MotionControl::start(std::vector<double> shares) {
     *this = MotionControl(target_ms_);
     shares_ = std::move(shares);
     for (const double share : shares_)
-        if (share >= 0.2) quality_.splats = share;  // about a quarter, or the nearest there is
+        // about a quarter of the splats, or the nearest share there is
+        if (share >= 0.2) quality_.splats = share;
     if (quality_.splats == 1 && !shares_.empty()) quality_.splats = shares_.front();
 }
 
-// From the time of the best of the last frames; where nothing fits, what takes least.
+// Chooses by the time of the best of the last frames; where nothing fits, it takes the cheapest.
 void MotionControl::choose(double room_ms) {
     const double splats_ms = best_.splats_ms / quality_.splats;
     const double pixels_ms = best_.pixels_ms / (quality_.scale * quality_.scale);
     std::vector<double> shares = {1};
     shares.insert(shares.end(), shares_.begin(), shares_.end());
-    double largest = kMostUp * quality_.splats;  // the next share, where that is farther off
+    double largest = kMostUp * quality_.splats;  // or the next share, where that is farther away
     for (const double share : shares)
         if (share > quality_.splats) largest = std::max(kMostUp * quality_.splats, share);
     const MotionQuality now = quality_;
@@ -102,7 +104,7 @@ void MotionControl::measured(const MotionCost& cost) {
     if (first || ms < best_.total_ms()) best_ = cost;
     if (slow_ < kSlowFrames && quick_ < kQuickFrames) return;
     slow_ = quick_ = 0;
-    // Where panels and presentation leave nothing, a fifth of the time all the same.
+    // Where panels and presentation leave nothing, the picture still gets a fifth of the time.
     const double room_ms = std::max(kAim * target_ms_ - best_.fixed_ms, 0.2 * target_ms_);
     const bool fits = best_.splats_ms + best_.pixels_ms <= room_ms;
     if (slow != fits) choose(room_ms);
@@ -110,7 +112,7 @@ void MotionControl::measured(const MotionCost& cost) {
 
 namespace {
 
-constexpr double kRest_s = 0.12;  // without change, before the picture is refined
+constexpr double kRest_s = 0.12;  // time without change before the picture is refined
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
 double seconds_between(PicturePacing::Time from, PicturePacing::Time to) {
@@ -129,7 +131,7 @@ bool PictureKey::operator==(const PictureKey& o) const {
 }
 
 PictureStep PicturePacing::next(const PictureKey& key, const Frame& frame, Time now) {
-    last_.version = key.version;  // an edit or a training step is no motion
+    last_.version = key.version;  // an edit or a training step is not motion
     if (!(key == last_)) changed_at_ = now;
     last_ = key;
     const bool refine =
@@ -184,7 +186,7 @@ namespace {
 
 struct LevelsCancelled {};
 
-constexpr int kQuickNice = 5, kNice = 15;  // pictures come first
+constexpr int kQuickNice = 5, kNice = 15;  // lower priority than the pictures
 
 SplatModel without(const SplatModel& model, const std::vector<std::uint8_t>& removed) {
     SplatModel kept = model;
@@ -211,7 +213,7 @@ void MotionLevels::run() {
         make_levels(true);
         make_levels(false);
     } catch (const LevelsCancelled&) {
-    } catch (const std::bad_alloc&) {  // the important splats do without them
+    } catch (const std::bad_alloc&) {  // the important splats do without levels
     }
     model_ = SplatModel();
     done_ = true;
@@ -219,7 +221,7 @@ void MotionLevels::run() {
 }
 
 void MotionLevels::make_levels(bool quick) {
-    setpriority(PRIO_PROCESS, 0, quick ? kQuickNice : kNice);  // of this thread, on Linux
+    setpriority(PRIO_PROCESS, 0, quick ? kQuickNice : kNice);  // applies to this thread, on Linux
     const MergeOptions options{.threads = 1, .quick = quick, .progress = [this](double) {
                                    if (cancelled_) throw LevelsCancelled();
                                }};
@@ -244,15 +246,15 @@ std::optional<SplatModel> MotionLevels::take() {
     return level;
 }
 
-// Functions are looked for in what is loaded: GLFW may be built without X11, and an older libX11
-// lacks one of them.
+// Functions are looked up in the libraries that are loaded: GLFW may be built without X11, and an
+// older libX11 lacks one of them.
 
 namespace {
 
 constexpr std::size_t kRequestRoom = 1
                                      << 20;  // bytes: requests of a window's end take some hundred
 
-// How Xlib's Display begins (X11/Xlib.h: _XPrivDisplay, with the names of X11/Xlibint.h).
+// The beginning of Xlib's Display (X11/Xlib.h: _XPrivDisplay, with the names of X11/Xlibint.h).
 struct DisplayHead {
     void *extensions, *free_functions;
     int socket, connection_index, major_version, minor_version;
@@ -266,11 +268,12 @@ struct DisplayHead {
     void *queue_head, *queue_tail;
     int queue_length;
     unsigned long last_read, last_sent;
-    char *last_request, *buffer, *end, *limit;  // of the requests that wait to be sent
+    char *last_request, *buffer, *end, *limit;  // the requests that wait to be sent
 };
 
-// Requests find no room once Xcb has the connection back and it is dead: Xlib then returns a null
-// that its own functions do not look for. Nothing of what goes into this room is sent.
+// Once Xcb has the connection back and it is dead, requests find no room, and Xlib returns a null
+// pointer that its own functions do not check. This gives them room; nothing that is written there
+// is sent.
 void make_room(void* display) {
     auto* const head = static_cast<DisplayHead*>(display);
     auto* const room = static_cast<char*>(std::malloc(kRequestRoom));  // XCloseDisplay frees it
@@ -291,7 +294,7 @@ bool survive_display_loss(std::atomic<bool>& lost) {
     using GetDisplay = void* (*)();
     using OnExit = void (*)(void* display, void* user);
     using SetOnExit = void (*)(void* display, OnExit on_exit, void* user);
-    void* const x11 = ::dlopen("libX11.so.6", RTLD_LAZY | RTLD_NOLOAD);  // kept until the end
+    void* const x11 = ::dlopen("libX11.so.6", RTLD_LAZY | RTLD_NOLOAD);  // stays open until the end
     const auto get_display =
         reinterpret_cast<GetDisplay>(::dlsym(RTLD_DEFAULT, "glfwGetX11Display"));
     if (x11 == nullptr || get_display == nullptr) return false;
@@ -301,7 +304,7 @@ bool survive_display_loss(std::atomic<bool>& lost) {
     const auto set_on_error = reinterpret_cast<SetOnError>(::dlsym(x11, "XSetIOErrorHandler"));
     void* const display = set != nullptr && set_on_error != nullptr ? get_display() : nullptr;
     if (display == nullptr) return false;
-    // The first handler ends the process unless it is replaced, the second one if the first
+    // The first handler ends the process unless it is replaced; the second one does so if the first
     // returns.
     set_on_error([](void*) { return 0; });
     set(display, note_loss, &lost);

@@ -57,7 +57,7 @@ void AccuracyMeasure::step(
 
 namespace {
 
-// The first may compile; the lesser of the two others counts.
+// The first timing may include compiling; the smaller of the two others counts.
 constexpr int kTimings = 3;
 
 AccuracyMeasure::Frame timed_picture(SplatPicture& picture, const Camera& camera,
@@ -187,7 +187,7 @@ void WarmUp::run(const std::stop_token& stop, Device& window, const DeviceOption
                                    static_cast<int>(i));
         for (const PipelineKey& key : live_pipelines(device))
             if (!stop.stop_requested()) made_.emplace_back(window, key);
-    } catch (const std::exception&) {  // the window says what is wrong, where it is
+    } catch (const std::exception&) {  // the window reports the error where it matters
     }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// PictureWork: what draws pictures of its own while the window lives, one a frame: the export of a
-// camera path, and the measurement of settings and effects. Each may run beside the other.
+// PictureWork: work that draws pictures of its own while the window lives, one picture a frame. It
+// is the export of a camera path, or the measurement of settings and effects. Both may run at a
+// time.
 #pragma once
 
 #include <atomic>
@@ -30,9 +31,9 @@ class AccuracyMeasure {
         ImageU8 picture;
         double ms = 0;
     };
-    /// camera: of all pictures, whose size is therefore the same. display: as it is now; each
-    /// choice is put in its place alone. own: as the scene is meant to be shown; with the exact
-    /// preset, what the error is against.
+    /// camera: used for all pictures, which therefore have one size. display: the current one; each
+    /// choice replaces one setting of it. own: how the scene is meant to be shown; with the exact
+    /// preset it is what errors are measured against.
     AccuracyMeasure(const Camera& camera, const DisplaySettings& display,
                     const DisplaySettings& own);
 
@@ -48,7 +49,7 @@ class AccuracyMeasure {
         std::vector<MeasuredChoice> choices;
     };
     Camera camera_;
-    std::vector<Picture> pictures_;  // the exact one first, then as it is now
+    std::vector<Picture> pictures_;  // the exact one first, then the current one
     std::vector<MeasuredChoice> results_;
     size_t next_ = 0;
     ImageF exact_;
@@ -61,22 +62,23 @@ class PictureWork {
     void start_measure(const Camera& camera, const DisplaySettings& display,
                        const DisplaySettings& own);
     void cancel();
-    /// The scene that they show is gone: they end. What there is to say of it, may be "".
+    /// Ends the work, because the scene that it shows is gone. Returns what there is to say, or "".
     std::string lose_scene(const char* why);
 
     bool exports() const { return export_.has_value(); }
     bool measures() const { return measure_.has_value(); }
-    /// The next step draws into the picture.
+    /// Whether the next step draws into the picture.
     bool draws() const { return measures() || (exports() && !export_->has_frames()); }
     double export_share() const {
         return export_ ? export_->share() : -1;
-    }  // below 0: there is none
+    }  // negative: there is none
     double measure_share() const { return measure_ ? measure_->share() : -1; }
 
-    /// One picture of it; once all are there, a look whether the video is, or wait: until it is.
-    /// Where that ends the export, what came out. A failed export is over. Throws Error.
+    /// Draws one picture of the export. Once all are there, it looks whether the video is done, or
+    /// waits for it with `wait`. Returns what was written where that ends the export. A failed
+    /// export is over. Throws Error.
     std::optional<std::string> step_export(SplatPicture& picture, bool wait = false);
-    /// All that was measured until now. A failed measurement is over. Throws Error.
+    /// Returns all that has been measured so far. A failed measurement is over. Throws Error.
     std::vector<MeasuredChoice> step_measure(SplatPicture& picture);
 
   private:
@@ -84,26 +86,28 @@ class PictureWork {
     std::optional<AccuracyMeasure> measure_;
 };
 
-/// RGB of B8G8R8A8 [height][width].
+/// Converts B8G8R8A8 [height][width] to RGB.
 ImageU8 read_pixels(const Buffer& pixels, int width, int height);
-/// RGB of the last rendered picture.
+/// The last rendered picture as RGB.
 ImageU8 read_pixels(const SplatPicture& picture);
 
-// WarmUp: compiles what the pictures of a scene need before a window draws the first, on a thread
-// of its own. It draws on a device of its own first: drivers that compile at the first dispatch
-// keep that on disk, Mesa's among them. Then it makes the same pipelines for the window's device,
-// which finds them there.
+// WarmUp: compiles what the pictures of a scene need before a window draws the first one, on a
+// thread of its own. It first draws on a device of its own: drivers that compile at the first
+// dispatch, such as Mesa's, keep the result on disk. Then it makes the same pipelines for the
+// window's device, which finds them there.
 
 class WarmUp {
   public:
-    /// window: the window's device, which outlives this. options: of one like it. displays: a pane
-    /// each. A few splats of the model are drawn, at rest and in motion. wake: called from the
-    /// thread at the end. Its destructor waits for the picture or pipeline under way.
+    /// window: the window's device, which must outlive this. options: for a device like it.
+    /// displays: one for each pane. A few splats of the model are drawn, at rest and in motion.
+    /// wake: called from the thread at the end. The destructor waits for the picture or pipeline
+    /// under way.
     WarmUp(Device& window, DeviceOptions options, const SplatModel& model,
            std::vector<DisplaySettings> displays, const Camera& camera, std::function<void()> wake);
-    /// Whether it is over; also where it failed, as the window then compiles itself.
+    /// Whether it is over, even where it failed, as the window then compiles itself.
     bool done() const { return done_; }
-    /// Once it is done, for the window's device: to be kept until its pictures are drawn.
+    /// Once it is done: the pipelines for the window's device, to be kept until its pictures are
+    /// drawn.
     std::vector<Pipeline> take_pipelines() { return std::move(made_); }
 
   private:

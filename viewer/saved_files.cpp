@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// One name for a file, by whatever way it is named.
+// Gives one name to a file, whatever path leads to it.
 fs::path known_as(const fs::path& file) {
     std::error_code none;
     const fs::path whole = fs::weakly_canonical(fs::absolute(file), none);
@@ -36,9 +36,9 @@ void SavedFiles::check(const fs::path& file) {
     const fs::path before = std::exchange(asked_for_, known_as(file));
     if (kind == fs::file_type::not_found || ours_.contains(asked_for_)) return;
     if (kind != fs::file_type::regular)
-        throw Error(file.string(), "is there, and is not a plain file", "Choose another name.");
+        throw Error(file.string(), "exists, and is not a plain file", "Choose another name.");
     if (before == asked_for_) return;
-    throw Error(file.string(), "is there already; nothing was written",
+    throw Error(file.string(), "already exists; nothing was written",
                 "Choose another name, or save again to replace it.");
 }
 
@@ -51,7 +51,7 @@ namespace {
 
 constexpr std::size_t kMostRecent = 10;
 
-// None where the file is something else; empty where it is not there.
+// Nothing where the file is something else; empty where it does not exist.
 std::optional<std::vector<std::string>> read_recent(const std::filesystem::path& list) {
     if (!std::filesystem::exists(list)) return std::vector<std::string>();
     try {
@@ -82,7 +82,8 @@ void RecentFiles::opened(const std::filesystem::path& scene) const {
     std::optional<std::vector<std::string>> names = read_recent(list_);
     if (!names) return;
     std::filesystem::path path = std::filesystem::absolute(scene).lexically_normal();
-    if (!path.has_filename()) path = path.parent_path();  // a folder, named with a slash
+    // a folder may be named with a slash at its end
+    if (!path.has_filename()) path = path.parent_path();
     const std::string name = path.string();
     std::erase(*names, name);
     names->insert(names->begin(), name);
@@ -111,8 +112,8 @@ json read_list(const fs::path& list) {
     if (list.empty() || !fs::is_regular_file(list)) return json::array();
     json entries = json::parse(read_text_file(list), nullptr, false);
     if (!entries.is_array())
-        throw Error(list.string(), "is no list of scenes and their up",
-                    "Move it away to have a new one.");
+        throw Error(list.string(), "is not a list of scenes with their up directions",
+                    "Move it away, and a new one is made.");
     return entries;
 }
 
@@ -132,7 +133,7 @@ std::optional<glm::dvec3> RememberedUp::find(const fs::path& scene) const {
             const glm::dvec3 v = up.size() == 3 ? glm::dvec3(up[0], up[1], up[2]) : glm::dvec3(0.0);
             if (std::isfinite(glm::length(v)) && glm::length(v) > 0.5) return glm::normalize(v);
         }
-    } catch (const std::exception&) {  // as if nothing were known
+    } catch (const std::exception&) {  // treated as if nothing were known
     }
     return {};
 }
@@ -154,7 +155,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Nothing that is there is written over, links that lead nowhere among it.
+// No existing name is used, not even that of a link that leads nowhere.
 fs::path free_name(const fs::path& folder, const std::string& stem, const std::string& extension) {
     for (int n = 1;; ++n) {
         const std::string number = n == 1 ? "" : fmt::format("_{}", n);
@@ -164,7 +165,7 @@ fs::path free_name(const fs::path& folder, const std::string& stem, const std::s
     }
 }
 
-// A sentence: where it is, or why it is lost.
+// Returns a sentence that says where the file is, or why it is lost.
 std::string keep(const char* what, const fs::path& beside, const std::string& stem,
                  const std::string& extension, const std::function<void(const fs::path&)>& write) {
     std::error_code none;

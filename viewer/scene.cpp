@@ -21,7 +21,7 @@ namespace {
 struct Cancelled {};
 
 constexpr std::size_t kReadBlock = 8 << 20;             // bytes between two reports
-constexpr double kReadShare = 0.4, kDecodeShare = 0.5;  // of the time, by experience
+constexpr double kReadShare = 0.4, kDecodeShare = 0.5;  // shares of the loading time, by experience
 
 std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
                                       const LoadProgress& progress) {
@@ -45,13 +45,13 @@ std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
 
 }  // namespace
 
-// A pipe would be waited for until somebody writes to it, which nobody can cancel.
+// Reading a pipe would wait until somebody writes to it, which nobody could cancel.
 void check_scene_file(const std::filesystem::path& file) {
     std::error_code error;
     const std::filesystem::file_type kind = std::filesystem::status(file, error).type();
     using enum std::filesystem::file_type;
     if (kind == regular || scene_file_in(file)) return;
-    const char* const what = kind == not_found   ? "is not there"
+    const char* const what = kind == not_found   ? "does not exist"
                              : kind == directory ? "is a folder without a scene"
                              : kind == fifo      ? "is a pipe"
                              : kind == socket    ? "is a socket"
@@ -161,7 +161,7 @@ void SceneLoader::start(const std::filesystem::path& path, bool dropped, bool me
     job_ = std::make_unique<LoadJob>(file, wake_, units);
 }
 
-// Its thread ends at its next report of progress; nobody waits for that.
+// The thread ends at its next report of progress; nobody waits for that.
 void SceneLoader::cancel() {
     if (!job_) return;
     job_->cancel();
@@ -195,7 +195,7 @@ std::vector<float> importance(const SplatModel& m, const Bounds& bounds) {
         const double log_area = double{s[0]} + s[1] + s[2] - std::min({s[0], s[1], s[2]});
         const glm::dvec3 p(m.position[3 * i], m.position[3 * i + 1], m.position[3 * i + 2]);
         const double distance = std::max(glm::distance(p, middle) / bounds.radius, 1.0);
-        // Logarithms: a huge splat is no infinity. ln sigmoid, for any logit.
+        // Logarithms keep a huge splat from becoming infinite. This is ln sigmoid, for any logit.
         const double x = m.opacity_logit[i];
         const double log_opacity = x < 0 ? x - std::log1p(std::exp(x)) : -std::log1p(std::exp(-x));
         value[i] = static_cast<float>(log_opacity + log_area - 2 * std::log(distance));

@@ -23,30 +23,31 @@ namespace darb {
 struct Scene {
     std::filesystem::path file;
     SplatModel model;
-    Bounds bounds;                         // of nearly all splats
-    Subject subject;                       // what it is looked at for
-    std::string format;                    // as format_name says it
-    bool is_points = false;                // a point cloud: no splat parameters in the file
+    Bounds bounds;           // around nearly all splats
+    Subject subject;         // what the cameras look at
+    std::string format;      // a name from format_name
+    bool is_points = false;  // whether it is a point cloud, without splat parameters in the file
     std::vector<std::uint32_t> important;  // what is drawn in motion, most important first
-    std::string up;                        // as --up takes it, where the file says it; else empty
+    std::string up;                        // a value of --up where the file says it; else empty
     double load_s = 0;
     std::vector<std::string> notes;  // what was dropped or cannot be shown, a sentence each
 };
 
-/// Bounds, and what is important of the model; its subject as if it had no cameras.
+/// Measures the bounds, the most important splats, and the subject as if there were no cameras.
 void measure_scene(Scene& scene);
 
-/// Throws Error where this is neither a file nor a folder of a scene: it is not there, or a pipe.
+/// Throws Error where the path is neither a file nor a scene's folder: it does not exist, or is a
+/// pipe.
 void check_scene_file(const std::filesystem::path& file);
 
-/// A file that load_splats reads, or a PLY point cloud, which becomes small opaque splats.
-/// `progress` is called with 0..1 and what is being done; it throws to cancel. Throws Error naming
-/// the file.
+/// Reads a file that load_splats knows, or a PLY point cloud, which becomes small opaque splats.
+/// `progress` is called with a share of 0 to 1 and what is being done; it throws to cancel. Throws
+/// an Error that names the file.
 using LoadProgress = std::function<void(double share, const char* stage)>;
 Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& progress = {},
                       const StoredUnits& units = {});
 
-/// One file on a thread of its own. Cancelling takes effect at the next report of progress.
+/// Loads one file on a thread of its own. Cancelling takes effect at the next report of progress.
 class LoadJob {
   public:
     /// wake: called from the thread whenever there is something new to show.
@@ -71,40 +72,40 @@ class LoadJob {
     StoredUnits units_;
     std::atomic<double> share_{0};
     std::atomic<bool> cancelled_{false}, done_{false};
-    mutable std::mutex mutex_;  // of stage_
+    mutable std::mutex mutex_;  // guards stage_
     std::string stage_;
     std::optional<Scene> scene_;
     std::exception_ptr error_;
     std::thread thread_;
 };
 
-// SceneLoader: the one scene that is being loaded in the background, and the loads before it that
-// were cancelled and still run.
+// SceneLoader: the one scene that is being loaded in the background, and cancelled earlier loads
+// that still run.
 
 struct LoadedScene {
     Scene scene;
-    std::filesystem::path asked_for;  // before it was resolved to a file
-    bool dropped = false;             // on the window, rather than named
-    bool merges = false;              // into the scene that is there
+    std::filesystem::path asked_for;  // the path before it was resolved to a file
+    bool dropped = false;             // dropped on the window, rather than named
+    bool merges = false;              // to be added to the current scene
 };
 
 class SceneLoader {
   public:
     using Resolve = std::function<std::filesystem::path(const std::filesystem::path&)>;
-    /// resolve: the file that a path means, may be none. wake: called from other threads when there
-    /// is something new.
+    /// resolve: maps a path to the file that it means; may be null. wake: called from other threads
+    /// when there is something new.
     SceneLoader(Resolve resolve, std::function<void()> wake);
 
-    /// An earlier load is cancelled. Throws Error where the path means no scene.
+    /// Starts a load and cancels an earlier one. Throws Error where the path means no scene.
     void start(const std::filesystem::path& path, bool dropped, bool merges = false,
                const StoredUnits& units = {});
     void cancel();
     bool loading() const { return job_ != nullptr; }
-    double share() const { return job_ ? job_->share() : -1; }  // below 0: nothing is loaded
+    double share() const { return job_ ? job_->share() : -1; }  // negative: nothing is loaded
     std::string stage() const;
     /// The scene, once it is there. Throws Error where it could not be loaded.
     std::optional<LoadedScene> poll();
-    /// The same after waiting for it.
+    /// Does the same after waiting for the load.
     std::optional<LoadedScene> wait();
 
   private:
@@ -116,14 +117,15 @@ class SceneLoader {
     std::vector<std::unique_ptr<LoadJob>> cancelled_;
 };
 
-// Which splats of a scene matter most to its pictures: what is drawn while the camera moves.
+// The splats of a scene that matter most to its pictures. They are drawn while the camera moves.
 
-/// The most splats that are kept in this order; more are too slow for motion where all are.
+/// How many splats are kept in this order at most. More would be too slow where all are drawn.
 inline constexpr std::size_t kMostMoving = 400'000;
 
 /// Indices of the `count` splats with the largest opacity times area of their two longer axes, most
-/// important first; the area is divided by the squared distance to the scene's middle where that is
-/// beyond its radius, so that a far background does not take all. count: at most model.size().
+/// important first. The area is divided by the squared distance to the scene's middle where that is
+/// beyond its radius, so that a far background does not take all places. count: at most
+/// model.size().
 std::vector<std::uint32_t> most_important(const SplatModel& model, const Bounds& bounds,
                                           std::size_t count);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Session: everything that the panels show and edit, in three parts. Panels change it and ask, the
-// viewer acts.
+// Session: everything that the panels show and edit, in three parts. Panels change it and make
+// requests, and the viewer carries them out.
 #pragma once
 
 #include <chrono>
@@ -30,7 +30,7 @@ namespace darb {
 
 struct PathState {
     CameraPath path;
-    std::vector<KeyFrame> saved;  // as a file has them
+    std::vector<KeyFrame> saved;  // as they are in a file
     std::filesystem::path file = "camera_path.json";
     std::filesystem::path folder = "frames";
     float seconds_per_key = 2;
@@ -47,36 +47,36 @@ struct PathState {
 struct TrainingCurves {
     bool live = false, finished = false;
     int iteration = 0, last_iteration = 0;
-    std::vector<float> loss, psnr_db, splats;  // smoothed; thinned out as they get long
-    std::vector<float> held_out_psnr_db;       // one value an evaluation
+    std::vector<float> loss, psnr_db, splats;  // smoothed, and thinned out as they get long
+    std::vector<float> held_out_psnr_db;       // one value for each evaluation
     bool paused = false;
-    int steps_to_go = 0;  // while paused
+    int steps_to_go = 0;  // used while paused
 };
 
 struct FrameTimes {
-    std::vector<PassTime> passes;  // of the last picture
-    double picture_ms = 0;         // wall clock, of the last picture
+    std::vector<PassTime> passes;  // times of the last picture
+    double picture_ms = 0;         // wall clock time of the last picture
     double frame_ms = 0;           // the whole frame: picture, panels, presentation
-    MotionQuality quality;         // that it had
+    MotionQuality quality;         // the quality of that frame
     std::uint32_t visible = 0, intersections = 0;
-    double full_ms = 0;            // of the last picture at full resolution
+    double full_ms = 0;            // time of the last picture at full resolution
     std::deque<double> moving_ms;  // whole frames in motion, latest last
 };
 
-/// One choice of one switch, all others as they are, at one camera.
+/// One choice of one switch, with all others as they are, at one camera.
 struct MeasuredChoice {
     int row = 0, choice = 0;  // viewer/switches.h
-    double ms = 0;            // on the device, of the picture's passes
+    double ms = 0;            // device time of the picture's passes
     double psnr_db = 0;       // of its 8-bit picture against the exact one; infinity where equal
 };
 
-/// Shares of 0 to 1; below 0 where nothing of the kind goes on.
+/// Shares from 0 to 1; negative where no such work goes on.
 struct WorkProgress {
     double load = -1, exporting = -1, measuring = -1;
     std::string load_stage;
 };
 
-/// Said over the picture for some seconds.
+/// A message over the picture, shown for some seconds.
 struct Toast {
     std::string text;
     std::chrono::steady_clock::time_point until;
@@ -85,20 +85,20 @@ struct Toast {
 struct OpenDialog {
     bool shown = false, merges = false;
     std::filesystem::path folder;
-    std::vector<FolderEntry> entries;           // of the folder
+    std::vector<FolderEntry> entries;           // what the folder holds
     std::vector<std::filesystem::path> recent;  // latest first
 };
 
-/// A box or a sphere, whose splats an edit selects or deletes.
+/// A box or a sphere whose splats an edit selects or deletes.
 struct Selection {
     Region region;
     bool shown = false;
 };
 
-/// Quit, or another scene: asked for while edits are not saved.
+/// A request to quit or to open another scene, asked for while edits are not saved.
 struct Leaving {
     bool quit = false;
-    std::filesystem::path open;  // where it is not quit
+    std::filesystem::path open;  // what to open; empty to quit
 };
 
 /// What is shown (viewer/document.h).
@@ -109,19 +109,19 @@ struct ShownState {
     std::filesystem::path save_file;
     Navigation navigation;
     double fly_speed = 1;            // world units a second
-    std::optional<EffectPlan> plan;  // of the scene
+    std::optional<EffectPlan> plan;  // the plan for the scene
     Photos photos;
     PathState path;
     TrainingCurves training;
-    std::string title;          // of what is shown, for a window
-    int sh_degree = 0;          // highest of the scene or the run
-    bool up_is_guess = false;   // nothing says what is up, nor did the user
-    bool save_upright = false;  // turns what is saved so that up becomes -y
+    std::string title;          // what is shown, for a window's title
+    int sh_degree = 0;          // highest degree of the scene or the run
+    bool up_is_guess = false;   // neither the file nor the user says what is up
+    bool save_upright = false;  // turns a saved scene so that up becomes -y
 };
 
 /// How it is painted (viewer/painter.h).
 struct PaintedState {
-    DisplaySettings display, own;  // own: as the scene is meant to be shown
+    DisplaySettings display, own;  // own: how the scene is meant to be shown
     Panes panes;
     FrameTimes times;
     std::vector<MeasuredChoice> measured;
@@ -133,33 +133,34 @@ struct PaintedState {
 /// What was asked, and what is answered (viewer/controller.h).
 struct AskedState {
     RequestQueue requests;
-    std::vector<WindowRequest> for_window;  // of the last frame
+    std::vector<WindowRequest> for_window;  // from the last frame
     ToolState tools;
     OpenDialog open_dialog;
     std::optional<Leaving> leaving;  // waits for an answer
     WorkProgress progress;
-    std::string error;         // shown until dismissed
-    std::string note;          // shown in the status line, by tell
+    std::string error;         // shown until it is dismissed
+    std::string note;          // shown in the status line, set by tell
     std::deque<Toast> toasts;  // latest last
-    int told = 0;              // how many there were
-    bool help = false;         // the list of keys
+    int told = 0;              // counts all toasts so far
+    bool help = false;         // whether the list of keys is shown
 
     void ask(const Request& request) { requests.push_back(request); }
-    /// In the status line and over the picture.
+    /// Shows the text in the status line and over the picture.
     void tell(const std::string& text);
-    /// A step that fails leaves the others alone: its error is shown. Whether it did not.
+    /// Runs a step and shows its error, so that other steps go on. Returns whether it succeeded.
     bool attempt(const std::function<void()>& step);
 };
 
-/// All of it, for the panels.
+/// All three parts, for the panels.
 struct Session : ShownState, PaintedState, AskedState {};
 
-/// The panels of one frame; progress, errors and questions also where session.panels is off. Needs
-/// an ImGui frame, in whose coordinates they are.
+/// Draws the panels of one frame; progress, errors and questions also where session.panels is off.
+/// It needs an ImGui frame, whose coordinates it uses.
 void draw_panels(Session& session);
-/// px that the side panel takes from the left of the window where it was not moved; 0: hidden.
+/// Width in px that the side panel takes from the left of the window where it was not moved; 0:
+/// hidden.
 float panel_width(const Session& session);
-/// A window of this size, px, without what the panel covers, where enough is left beside it.
+/// A window of this size, px, without what the panel covers, where enough room is left beside it.
 WindowArea free_area(const Session& session, int width, int height);
 
 }  // namespace darb

@@ -15,20 +15,20 @@ namespace darb {
 
 namespace {
 
-constexpr float kRemovedLogit = -100;  // clamped to -30: far below any cut-off
+constexpr float kRemovedLogit = -100;  // the shader clamps it to -30, far below any cut-off
 constexpr float kOpaqueLogit = 8;
-constexpr float kTransparentLogit = -2.2f;  // an opacity of a tenth
-// Orange, (colour - 0.5) / 0.2821 of each channel, over what is selected.
+constexpr float kTransparentLogit = -2.2f;  // an opacity of 0.1
+// The highlight of a selection is orange; these are (colour - 0.5) / 0.2821 of each channel.
 constexpr float kHighlightDc[3] = {1.77f, 0.71f, -1.6f};
 constexpr float kHighlightShare = 0.65f;
-// Ellipsoids: cut where alpha falls below 0.9. A Gaussian is there at sqrt(2 ln(1/0.9)) = 0.459
+// Ellipsoids are cut where alpha falls below 0.9. A Gaussian does so at sqrt(2 ln(1/0.9)) = 0.459
 // standard deviations, so they are drawn 2 / 0.459 times as large.
 constexpr float kEllipsoidCutoff = 0.9f;
 constexpr float kEllipsoidGrowth = 1.472f;  // ln(2 / 0.459)
-constexpr float kPointLogScale = -20;       // leaves the low-pass: a dot of about two pixels
-constexpr int kRehearsal = -1;              // in the place of a pane: what nobody sees
+constexpr float kPointLogScale = -20;  // leaves only the low-pass filter: a dot of about two pixels
+constexpr int kRehearsal = -1;         // used in place of a pane for pictures that nobody sees
 
-// Without harmonics where it is no copy.
+// A copy in a style has no harmonics.
 SplatModel in_style(const SplatModel& own, SplatStyle style) {
     if (style == SplatStyle::splats) return own;
     SplatModel model = pick_splats(own, {});
@@ -40,7 +40,7 @@ SplatModel in_style(const SplatModel& own, SplatStyle style) {
     for (float& s : model.log_scale)
         s = style == SplatStyle::points ? kPointLogScale : s + kEllipsoidGrowth;
     model.opacity_logit.assign(own.size(), kOpaqueLogit);
-    if (style == SplatStyle::ellipsoids) {  // what is nearly transparent would hide the rest
+    if (style == SplatStyle::ellipsoids) {  // nearly transparent splats would hide the rest
         for (size_t i = 0; i < model.size(); ++i)
             if (own.opacity_logit[i] < kTransparentLogit) model.opacity_logit[i] = kRemovedLogit;
         set_kernel(model, KERNEL_GAUSSIAN);
@@ -157,7 +157,7 @@ void SplatPicture::drop_levels() {
     levels_ended_ = false;
 }
 
-// The largest that is not more than asked for.
+// The largest level that is not above the share that was asked for.
 const GpuSplats* SplatPicture::level_of(SplatStyle style, double share) const {
     if (style != SplatStyle::splats || !own_) return nullptr;
     const double most = share * static_cast<double>(own_->count()) + 1;
@@ -178,7 +178,7 @@ const GpuSplats& SplatPicture::styled(SplatStyle style) {
     return *styled_;
 }
 
-// A level where there is one; else the beginning of a copy in the order of importance.
+// A level where there is one, else the beginning of a copy in the order of importance.
 const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
     if (share >= 1 || important_.empty() || !own_) return styled(style);
     if (const GpuSplats* level = level_of(style, share)) return *level;
@@ -210,7 +210,7 @@ ForwardOptions SplatPicture::options_for(const Key& key) {
     options.store_for_backward = key.store;
     options.backward_follows = false;
     if (key.ellipsoids) options.alpha_cutoff = kEllipsoidCutoff;
-    // What the passes of these modes read and write is laid out like this.
+    // The passes of these modes read and write the layout that these options choose.
     if (key.store) options.depth_order = DEPTH_ORDER_CENTRE;
     if (key.store || key.depth) options.storage = STORAGE_FLOAT32;
     return options;
@@ -223,7 +223,7 @@ SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool mov
     const bool plain = display.style == SplatStyle::splats || !own_;
     key.sh_stored = plain ? splats()->sh_degree() : 0;
     key.accuracy = moving ? preset_accuracy(kFast) : display.accuracy;
-    key.accuracy.choice[kRenderScale] = 0;  // of the camera
+    key.accuracy.choice[kRenderScale] = 0;  // the camera has the scale already
     key.effects = display.effects;
     key.effects.antialias &= display.style == SplatStyle::splats;
     key.huge_splat_path = display.huge_splat_path;
@@ -337,7 +337,7 @@ void SplatPicture::reserve(const Job& job) {
     buffers.reserve(splats, intersections, width, height);
 }
 
-// The older of the two is written.
+// Writes the older of the two images.
 void SplatPicture::prepare_image(Job& job, int index) {
     Image& image = images_[index];
     const std::uint64_t bytes =
@@ -366,7 +366,8 @@ void SplatPicture::render(const Job& job) {
     } while (job.slot->buffers->make_room(rendered_.status));
 }
 
-// The first of a slot compiles, and its buffers are a guess: nothing would be seen meanwhile.
+// The first picture of a slot compiles, and its buffers are a guess, so nothing would be seen until
+// it is done.
 void SplatPicture::give(int frame, const Job& job) {
     if (job.slot->fresh) {
         render(job);
@@ -399,7 +400,7 @@ std::vector<StartedPicture> SplatPicture::take_done() {
     return std::exchange(done_, {});
 }
 
-// The first of those under way; waits for it.
+// Waits for the oldest picture under way.
 void SplatPicture::land() {
     std::unique_ptr<Flight> flight = std::move(under_way_.front());
     under_way_.pop_front();
@@ -422,7 +423,7 @@ void SplatPicture::land() {
     free_.push_back(std::move(flight));
 }
 
-// The flag of a frame without room stays until the host clears it, so those after it in the same
+// The flag of a frame without room stays until the host clears it, so later frames in the same
 // buffers have it, too.
 bool SplatPicture::make_room(Flight& flight, const gpu::FrameStatus& status) {
     if (flight.in_vain) return true;
@@ -444,7 +445,7 @@ void SplatPicture::settle() {
     while (!under_way_.empty()) land();
 }
 
-// Pictures under way may read them still.
+// Pictures under way may still read them.
 void SplatPicture::drop(GpuSplats splats) {
     if (!under_way_.empty()) under_way_.back()->dropped.push_back(std::move(splats));
 }
@@ -480,7 +481,7 @@ void SplatPicture::record(const Job& job, Flight& flight) {
     flight.exchange.fetch(commands, frame.counters.status);
 }
 
-// What is marked since the last picture.
+// Records the marks that have changed since the last picture.
 void SplatPicture::record_uploads(Flight& flight) {
     const auto upload = [&](int attribute, std::vector<float>& values) {
         if (values.empty() || !own_) return;

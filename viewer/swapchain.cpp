@@ -122,7 +122,7 @@ bool Swapchain::acquire(int width, int height, std::uint32_t& index) {
     const VkResult result = vkAcquireNextImageKHR(device_->handle(), chain_, UINT64_MAX,
                                                   acquired_[next], VK_NULL_HANDLE, &index);
     if (result == VK_SUCCESS || result == VK_SUBOPTIMAL_KHR) turn_ = next;
-    if (result == VK_SUBOPTIMAL_KHR) return true;  // shown once more, then the size is looked at
+    if (result == VK_SUBOPTIMAL_KHR) return true;  // shown once more; the size is checked next time
     if (result == VK_ERROR_OUT_OF_DATE_KHR) {
         stale_ = true;
         return false;

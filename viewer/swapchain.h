@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Swapchain: gives a canvas to a window's surface.
+// Swapchain: presents a canvas on a window's surface.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -14,16 +14,16 @@ namespace darb {
 
 class Swapchain {
   public:
-    /// Takes the surface. Throws Error where the device cannot present to it.
+    /// Takes ownership of the surface. Throws Error where the device cannot present to it.
     Swapchain(Device& device, VkSurfaceKHR surface);
     ~Swapchain();
     Swapchain(const Swapchain&) = delete;
     Swapchain& operator=(const Swapchain&) = delete;
 
     /// Copies the composed canvas into the next image and presents it, without waiting for the
-    /// device. compose records the canvas and is called once there is an image. False where nothing
-    /// is shown, as the window changed its size meanwhile or has none: the next call makes a new
-    /// chain.
+    /// device. compose records the canvas and is called once there is an image. Returns false where
+    /// nothing is shown, because the window has just changed its size or has none; the next call
+    /// makes a new chain.
     template <class Compose>
     bool present(Canvas& canvas, const Compose& compose) {
         std::uint32_t index = 0;
@@ -45,8 +45,8 @@ class Swapchain {
     VkPresentModeKHR mode_ = VK_PRESENT_MODE_FIFO_KHR;
     VkSwapchainKHR chain_ = VK_NULL_HANDLE;
     std::vector<DeviceImage> images_;
-    std::vector<VkSemaphore> drawn_;                       // one an image
-    std::array<VkSemaphore, kFramesUnderWay> acquired_{};  // one a frame under way
+    std::vector<VkSemaphore> drawn_;                       // one for each image
+    std::array<VkSemaphore, kFramesUnderWay> acquired_{};  // one for each frame under way
     std::size_t turn_ = 0;
     VkExtent2D extent_{};
     bool stale_ = true;

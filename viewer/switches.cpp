@@ -11,7 +11,7 @@ namespace darb {
 
 namespace {
 
-/// The switch of an effect that is on or off.
+/// The switch of an effect that is either on or off.
 bool& on_off(int row, ProjectionEffects& effects) {
     const auto found =
         std::find_if(std::begin(kProjectionSwitches), std::end(kProjectionSwitches),
@@ -20,7 +20,7 @@ bool& on_off(int row, ProjectionEffects& effects) {
     return effects.*found->on;
 }
 
-/// Footprint is no part of a preset: another one shows another scene.
+/// The footprint is no part of a preset, because another footprint shows another scene.
 void choose_preset(int preset, Accuracy& accuracy) {
     const int footprint = accuracy.choice[kFootprint], degree = accuracy.choice[kShDegree];
     accuracy = preset_accuracy(preset);

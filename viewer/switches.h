@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The switches whose time and error the viewer measures: presets, accuracy settings and effects, as
-// rows of one table, each with its choices.
+// The switches whose time and error the viewer measures: presets, accuracy settings and effects.
+// They are rows of one table, each with its choices.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace darb {
 
-/// A row is an AccuracySettingId, an effect of effect_row(), or all settings at once:
+/// A row is an AccuracySettingId, effect_row() of an effect, or all settings at once:
 inline constexpr int effect_row(int effect) {
     return kAccuracyCount + effect;
 }
@@ -21,7 +21,7 @@ inline constexpr int kPresetRow = kAccuracyCount + EFFECT_COUNT;
 inline constexpr std::array kAccuracyRows = {
     kPresetRow,    int{kEvaluation}, int{kFootprint},  int{kAlphaCutoff}, int{kTransmittanceStop},
     int{kStorage}, int{kDepthOrder}, int{kRenderScale}};
-/// The effects of a view; of the others the plan has a reason alone.
+/// Only the effects of a view have a row; for the others the plan has no more than a reason.
 inline constexpr bool has_effect_row(int effect) {
     for (const ProjectionSwitch& s : kProjectionSwitches)
         if (s.effect == effect) return true;
@@ -41,9 +41,9 @@ inline constexpr std::array kEffectRows = [] {
 }();
 
 std::string row_name(int row);
-/// sh_degree: highest of the scene.
+/// sh_degree: the highest of the scene.
 std::vector<std::string> row_choices(int row, int sh_degree);
-/// -1: none of them, where single settings differ from every preset.
+/// The choice in use; -1: none, where single settings differ from every preset.
 int chosen(int row, const DisplaySettings& display);
 void choose(int row, int choice, DisplaySettings& display);
 

@@ -14,7 +14,7 @@ namespace darb {
 
 namespace {
 
-constexpr double kHandle = 0.11;  // of its size: so near a pointer takes it
+constexpr double kHandle = 0.11;  // share of its size: how near a pointer must be to grab a handle
 constexpr int kRingSteps = 64;
 constexpr double kEdgeOn = 0.05;  // cosine between a view ray and a ring's plane
 constexpr double kLeastFactor = 0.01, kMostFactor = 100;
@@ -25,7 +25,7 @@ glm::dvec3 axis_of(int axis) {
     return v;
 }
 
-// World units of the gizmo's size.
+// The world units that make up the gizmo's size.
 double size_of(const Gizmo& g, const Camera& c) {
     const double depth = (c.rotation * g.centre + c.translation).z;
     return std::max(depth, 1e-6) * g.size_px / c.fx;
@@ -36,7 +36,7 @@ glm::dvec3 ray_of(const Camera& c, const glm::dvec2& px) {
     return glm::normalize(glm::transpose(c.rotation) * d);
 }
 
-// Along an axis from the centre, to what is nearest to the ray.
+// How far along an axis from the centre the point nearest to the ray lies.
 std::optional<double> along_axis(const Gizmo& g, const Camera& c, int axis, const glm::dvec2& px) {
     const glm::dvec3 a = axis_of(axis), r = ray_of(c, px), w = g.centre - c.centre();
     const double ar = glm::dot(a, r), square = 1 - ar * ar;
@@ -44,7 +44,7 @@ std::optional<double> along_axis(const Gizmo& g, const Camera& c, int axis, cons
     return (ar * glm::dot(r, w) - glm::dot(a, w)) / square;
 }
 
-// On the ring's plane where the ray meets it, else on the screen.
+// The angle on the ring's plane where the ray meets it, else on the screen.
 std::optional<double> angle_on_ring(const Gizmo& g, const Camera& c, int axis,
                                     const glm::dvec2& px) {
     const glm::dvec3 n = axis_of(axis), r = ray_of(c, px);
@@ -165,7 +165,7 @@ void end_stroke(const Camera& camera, Session& s) {
     show_edit(s.edit.select(mask, t.combine), s);
 }
 
-// The middle of what is selected, else of all.
+// The centre is the middle of the selection, else of everything.
 void find_centre(Session& s) {
     ToolState& t = s.tools;
     if (t.centre_version == s.edit.version()) return;
@@ -196,7 +196,7 @@ bool use_gizmo(const Input& in, const Camera& camera, Session& s) {
         s.edit.begin_transform(s.scene->model);
     }
     if (in.left) {
-        if (in.dx == 0 && in.dy == 0) return true;  // a hand that rests, or a click alone
+        if (in.dx == 0 && in.dy == 0) return true;  // the hand rests, or this is only a click
         const Similarity total =
             dragged(t.gizmo, camera, *t.handle, t.stroke.front(), {in.x, in.y});
         s.edit.drag_transform(total, s.scene->model);

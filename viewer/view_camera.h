@@ -11,24 +11,24 @@
 
 namespace darb {
 
-/// px of the window per px of the photo, such that the whole photo is seen.
+/// How many px of the window each px of the photo takes so that the whole photo is seen.
 double fit_scale(const Camera& camera, int width, int height);
-/// The photo's camera with its frame centred in the window, right of `left` px; what lies beyond it
-/// is shown too.
+/// The photo's camera with its frame centred in the window, right of `left` px. What lies beyond
+/// the frame is shown too.
 Camera fitted(const Camera& camera, int width, int height, int left = 0);
 
-/// Where it is seen, px; nothing behind the camera.
+/// The pixel at which the point is seen; nothing behind the camera.
 inline std::optional<glm::dvec2> pixel_of(const Camera& c, const glm::dvec3& world) {
     const glm::dvec3 p = c.rotation * world + c.translation;
     if (!(p.z > 0)) return {};
     return glm::dvec2(c.fx * p.x / p.z + c.cx, c.fy * p.y / p.z + c.cy);
 }
 double distance_to_segment(const glm::dvec2& p, const glm::dvec2& a, const glm::dvec2& b);
-/// The same view in another size, a share of the width and of the height.
+/// The same view in another size, scaled by this share in width and height.
 Camera at_scale(const Camera& camera, double scale);
 
-/// The nearest of the splats whose mean projects within 8 px of the pointer and that are neither
-/// deleted nor nearly transparent; its mean in the world.
+/// The mean, in the world, of the nearest splat that projects within 8 px of the pointer and is
+/// neither deleted nor nearly transparent.
 std::optional<glm::dvec3> pick(const SplatModel& model, const std::vector<std::uint8_t>& removed,
                                const Camera& camera, double x, double y);
 

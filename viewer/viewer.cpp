@@ -13,7 +13,7 @@ namespace darb {
 namespace {
 
 constexpr double kStep_s = 1.0 / 60;
-constexpr double kLook_s = 0.1;  // between two looks whether ffmpeg has ended
+constexpr double kLook_s = 0.1;  // time between two looks at whether ffmpeg has ended
 constexpr double kNoFrame = std::numeric_limits<double>::infinity();
 
 float panel_scale(const ViewerOptions& options) {
@@ -33,7 +33,7 @@ Viewer::Viewer(Device& device, const ViewerOptions& options, GLFWwindow* window)
 
 double Viewer::frame(const Input& input, int width, int height, bool full) {
     const double seconds = start_clock();
-    painter_.begin(width, height);  // now the panels know whether the pointer is on one
+    painter_.begin(width, height);  // from here on the panels know whether the pointer is on one
     controller_.take_loaded();
     controller_.take_pictures_of_run();
     const Gui& gui = painter_.gui();
@@ -51,8 +51,8 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
         {painter_.exports() ? kLook_s : kNoFrame, toasts_s, painter_.seconds_to_next()});
 }
 
-// Returns the seconds that the frame moves by: after a pause a short step, as nothing moved in
-// between.
+// Returns the seconds by which the frame moves. After a pause they are few, because nothing moved
+// in between.
 double Viewer::start_clock() {
     const double since =
         seconds_since(std::exchange(last_frame_, std::chrono::steady_clock::now()));
@@ -61,7 +61,7 @@ double Viewer::start_clock() {
 
 void Viewer::draw_whole(int width, int height) {
     frame({}, width, height, true);
-    painter_.forget();  // the times are those of a second picture: the first may have compiled
+    painter_.forget();  // times should come from a second picture, as the first may have compiled
     do frame({}, width, height, true);
     while (!painter_.settled());
 }

@@ -19,7 +19,7 @@ namespace darb {
 namespace {
 
 constexpr double kDoubleClick_s = 0.35;
-constexpr int kSettlingFrames = 2;  // the panels need a frame to react to what changed in one
+constexpr int kSettlingFrames = 2;  // the panels need one frame to react to a change in another
 
 std::string last_error() {
     const char* text = nullptr;
@@ -102,7 +102,7 @@ VkSurfaceKHR make_surface(Device& device, GLFWwindow* window) {
     return surface;
 }
 
-// Of the panels, in px. wanted: 0: as the desktop wants it.
+// The scale of the panels, in px. wanted: 0 means the desktop's choice.
 float panel_scale(GLFWwindow* window, float wanted) {
     float x = 1, y = 1;
     glfwGetWindowContentScale(window, &x, &y);
@@ -133,7 +133,7 @@ void WindowSystem::require(DeviceOptions& options) const {
     options.device_extensions = {VK_KHR_SWAPCHAIN_EXTENSION_NAME};
 }
 
-// The callbacks collect input here; ImGui's, installed later, call these first.
+// The callbacks collect input here. ImGui's callbacks are installed later and call these first.
 struct ViewerWindow::State {
     State(Device& device, const ViewerOptions& options, int width, int height)
         : window(width, height),
@@ -154,9 +154,9 @@ struct ViewerWindow::State {
     void install_callbacks();
     void collect();
     void drag(double x, double y);
-    glm::dvec2 pointer() const;  // px, now: later than the events that wait
+    glm::dvec2 pointer() const;  // px; where it is now, later than the events that wait
     void note_buttons();
-    bool* held_key(int key);  // its flag in input, or null
+    bool* held_key(int key);  // the key's flag in input, or null
     void draw();
     void close_minimised();
     void obey(WindowRequest request);
@@ -166,7 +166,7 @@ struct ViewerWindow::State {
     GlfwWindow window;
     Swapchain swapchain;
     std::optional<Viewer> viewer;
-    float wanted_scale;  // of the panels; 0: the desktop's
+    float wanted_scale;  // scale of the panels; 0: the desktop's
     std::string title;
     Input input;
     bool dirty = true;
@@ -175,7 +175,7 @@ struct ViewerWindow::State {
     double next_frame_at = 0;  // s of GLFW's clock
     double last_click = -1;
     std::optional<glm::dvec2> last_pointer;  // px
-    int windowed[4] = {0, 0, 1280, 720};     // place and size outside of full screen
+    int windowed[4] = {0, 0, 1280, 720};     // place and size outside full screen
 };
 
 void ViewerWindow::State::install_callbacks() {
@@ -207,7 +207,7 @@ void ViewerWindow::State::install_callbacks() {
         for (int i = 0; i < count; ++i) of(from).input.dropped.emplace_back(paths[i]);
         of(from).dirty = true;
     });
-    glfwSetCharCallback(w, [](GLFWwindow* from, unsigned character) {  // whatever key has it
+    glfwSetCharCallback(w, [](GLFWwindow* from, unsigned character) {  // by whatever key has it
         if (character == '?') of(from).input.pressed.push_back(Key::help);
         of(from).dirty = true;
     });
@@ -218,7 +218,7 @@ void ViewerWindow::State::install_callbacks() {
         if (s.viewer) s.viewer->set_gui_scale(panel_scale(from, s.wanted_scale));
         s.dirty = true;
     });
-    glfwSetWindowCloseCallback(w, [](GLFWwindow* from) {  // the viewer may have a question
+    glfwSetWindowCloseCallback(w, [](GLFWwindow* from) {  // the viewer may have a question first
         State& s = of(from);
         if (s.viewer) s.viewer->session().ask(request::Quit{});
         s.dirty = true;
@@ -252,7 +252,8 @@ void ViewerWindow::State::note_buttons() {
     input.right |= button(GLFW_MOUSE_BUTTON_RIGHT);
 }
 
-// Motion with a button down adds up event by event: a quick drag may begin and end between frames.
+// Motion with a button down adds up event by event, because a quick drag may begin and end between
+// frames.
 void ViewerWindow::State::drag(double x, double y) {
     dirty = true;
     const glm::dvec2 at = glm::dvec2(x, y) * double{pixels_per_unit(window.handle)};
@@ -273,7 +274,7 @@ glm::dvec2 ViewerWindow::State::pointer() const {
     return at * double{pixels_per_unit(window.handle)};
 }
 
-// What is a state rather than an event: pointer, buttons, held keys.
+// Collects what is a state rather than an event: pointer, buttons, held keys.
 void ViewerWindow::State::collect() {
     GLFWwindow* w = window.handle;
     input.x = pointer().x;
@@ -300,7 +301,7 @@ void ViewerWindow::State::toggle_full_screen() {
         glfwSetWindowMonitor(w, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
 }
 
-// Without a frame that could ask.
+// A minimised window has no frame in which to ask.
 void ViewerWindow::State::close_minimised() {
     const Session& session = viewer->session();
     if (!asks_for<request::Quit>(session.requests)) return;
@@ -375,7 +376,8 @@ bool ViewerWindow::pump(double patience_s) {
         glfwWaitEventsTimeout(sleep);
     else
         glfwWaitEvents();
-    // Dirty, as after an event: a message that a load ends with takes frames to appear.
+    // The frame counts as dirty, as after an event: the message that ends a load takes frames to
+    // appear.
     if (s.woken.exchange(false)) s.dirty = true;
     if (due()) s.draw();
     return glfwWindowShouldClose(s.window.handle) == GLFW_FALSE;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ViewerWindow: a GLFW window around a Viewer. Frames are drawn when there is something new: input,
-// a finished load, a picture to refine; in between the process sleeps.
+// ViewerWindow: a GLFW window around a Viewer. It draws a frame when there is something new (input,
+// a finished load, a picture to refine), and otherwise the process sleeps.
 #pragma once
 
 #include <memory>
@@ -12,20 +12,20 @@
 
 namespace darb {
 
-/// The window system, started before the device so that the device can be made for it.
+/// The window system. It is started before the device, so that the device can be made for it.
 class WindowSystem {
   public:
     WindowSystem();  // throws Error where there is no display
     ~WindowSystem();
     WindowSystem(const WindowSystem&) = delete;
     WindowSystem& operator=(const WindowSystem&) = delete;
-    /// What Device needs to present to windows.
+    /// Asks for what Device needs to present to windows.
     void require(DeviceOptions& options) const;
 };
 
 class ViewerWindow {
   public:
-    /// options.wake is set here. width and height in screen coordinates.
+    /// options.wake is set here. width and height are in screen coordinates.
     ViewerWindow(Device& device, ViewerOptions options, int width, int height);
     ~ViewerWindow();
     ViewerWindow(const ViewerWindow&) = delete;
@@ -33,12 +33,12 @@ class ViewerWindow {
 
     Viewer& viewer();
     void set_title(const std::string& title);
-    /// The next pump draws a frame.
+    /// Makes the next pump draw a frame.
     void redraw();
-    /// Handles what happened and draws a frame where one is wanted; sleeps up to patience_s (may be
-    /// infinity) until there is something to do. False once the window is closed.
+    /// Handles what happened and draws a frame where one is wanted. Sleeps up to patience_s (may be
+    /// infinity) until there is something to do. Returns false once the window is closed.
     bool pump(double patience_s);
-    /// As `wake` of the options; from any thread.
+    /// Does what `wake` of the options does; may be called from any thread.
     void wake();
 
   private:

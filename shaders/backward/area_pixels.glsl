@@ -9,7 +9,7 @@ struct Pixels {
     uint last[PIXELS];
 };
 
-// With DEPTH_SUM, of each pixel; apart, so that nothing of it is left without.
+// One for each pixel with DEPTH_SUM. The array is separate, so that nothing of it remains without DEPTH_SUM.
 const uint DEPTHS = DEPTH_SUM == 1 ? PIXELS : 1u;
 float d_depth[DEPTHS];
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The pixels' state between dispatches, where SEGMENT > 0. Needs backward/area_pixels.glsl.
+// Loads and stores the pixels' state between dispatches, where SEGMENT > 0. Needs backward/area_pixels.glsl.
 
-// What is behind the intersections of this dispatch, from and for the other dispatches.
+// What lies behind the intersections of this dispatch comes from, and goes to, the other dispatches.
 void load_behind(inout Pixels px, uvec2 first) {
     for (uint k = 0u; k < PIXELS; ++k) {
         const uvec2 at = first + slot_offset(k);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A subgroup walks a part of a tile's list from its end over the pixels of an area: what blend_backward.comp and
-// blend_backward_team.comp have in common. Needs their bindings, lib/area.glsl, lib/hits.glsl,
-// backward/splat_sums.glsl, splat_exponent, and where the sums of intersection j of the sorted list go: place_of(j),
-// put_sums, put_exponent of that of a kernel with shapes, and put_depth with DEPTH_SUM.
+// A subgroup walks a part of a tile's list from its end over the pixels of an area. blend_backward.comp and
+// blend_backward_team.comp share this. Needs their bindings, lib/area.glsl, lib/hits.glsl, backward/splat_sums.glsl,
+// splat_exponent, and functions for where the sums of intersection j of the sorted list go: place_of(j), put_sums,
+// put_exponent for a kernel with shapes, and put_depth with DEPTH_SUM.
 
 #include "backward/area_pixels.glsl"
 
@@ -18,10 +18,11 @@ Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, floa
     return s;
 }
 
-// The collected splats of an area, at least one, last to first. centre: of the thread's first pixel.
+// Blends the collected splats of an area, of which there is at least one, last to first. centre: of the thread's first
+// pixel.
 void blend_hits(inout Pixels px, vec2 centre, uint count) {
     uint rest = count;
-    do {  // ends at its bottom, as the one within: see emit_cells
+    do {  // tested at the bottom, as is the inner loop: see emit_cells
         const uint size = min(rest, SUBGROUP_SIZE);
         rest -= size;
         vec4 shape = vec4(0.0), light = vec4(0.0);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Gradients of blend.comp: from dL/dimage to sums over pixels from which dL/d(mean, l11, l21, l22, opacity, colour)
-// follow, PARTIALS floats for each splat-tile intersection in the intersection's own slot, so that sums per splat need
-// no atomics and repeat bit by bit. Place: after the loss. Source: docs/math.md, Gradients.
-// One of three ways to the same sums: blend_backward_team.comp, blend_backward_buckets.comp.
-// Work: one subgroup a tile, its areas one after another, pixels dealt as in blend.comp; the lanes' sums are
-// reduced within the subgroup and added to the slot, which nobody else writes. No shared memory, no barrier.
-// Reads what the forward pass stored; slots must be zero before. Lists too long for one dispatch are worked off
-// SEGMENT intersections at a time, the last ones first; final_transmittance and behind hold the pixels' state in
-// between.
+// Gradients of blend.comp. It turns dL/dimage into sums over pixels, from which dL/d(mean, l11, l21, l22, opacity,
+// colour) follow: PARTIALS floats for each splat-tile intersection, in the intersection's own slot, so that the sums
+// per splat need no atomics and repeat bit by bit.
+// Place: after the loss. Source: docs/math.md, Gradients.
+// blend_backward_team.comp and blend_backward_buckets.comp are two other ways to the same sums.
+// Work: one subgroup per tile, which takes its areas one after another with pixels dealt as in blend.comp. The lanes'
+// sums are reduced within the subgroup and added to the slot, which nobody else writes. No shared memory, no barrier.
+// It reads what the forward pass stored; slots must be zero before. Lists that are too long for one dispatch are
+// processed SEGMENT intersections at a time, the last ones first; final_transmittance and behind hold the pixels' state
+// in between.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -21,8 +22,8 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 8;  // SUBGROUP_SIZE
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
-layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
-layout(constant_id = 31) const int ALPHA_GRADIENT = 0;  // 1: d_image has a plane more, dL/d(1 - transmittance)
+layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list per dispatch; 0: all of them
+layout(constant_id = 31) const int ALPHA_GRADIENT = 0;  // 1: d_image has one more plane, dL/d(1 - transmittance)
 
 #include "kernels/kernel.glsl"
 layout(push_constant, scalar) uniform Push { BlendArgs args; };

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Gradients of blend.comp as blend_backward.comp sums them, the other way round: a thread owns an intersection and
-// walks the tile's pixels, so that its sums stay in registers and go to the intersection's slot whole, without
-// reductions, atomics or additions to memory. Place: after bucket_behind. Source: Taming 3DGS (Mallick et al. 2024),
-// section 4, with what is behind a bucket from bucket_behind.comp, so that the steps within a bucket are those of
-// blend_backward.comp. Work: one subgroup, which is the workgroup, a bucket; where subgroups are smaller than buckets,
-// one part of it after another, the last first. Thread 0 has the last intersection; pixels enter there from the
-// checkpoints, and their transmittance and what is behind them pass along the subgroup by shuffles, one thread a step.
-// Shared memory: the pixels of the tile that reach into the bucket and that one of its ellipses may touch, packed.
+// Computes the same gradients as blend_backward.comp the other way round: a thread owns an intersection and walks the
+// tile's pixels, so that its sums stay in registers and go to the intersection's slot as a whole, without reductions,
+// atomics or additions to memory.
+// Place: after bucket_behind. Source: Taming 3DGS (Mallick et al. 2024), section 4. What lies behind a bucket comes
+// from bucket_behind.comp, so that the steps within a bucket are those of blend_backward.comp.
+// Work: one subgroup, which is the workgroup, per bucket. Where subgroups are smaller than buckets, it takes one part
+// of the bucket after another, the last one first. Thread 0 has the last intersection. Pixels enter there from the
+// checkpoints, and their transmittance and what lies behind them pass along the subgroup by shuffles, one thread per
+// step. Shared memory: the packed pixels of the tile that reach into the bucket and that one of its ellipses may touch.
 // Slots of buckets that no pixel reaches must be zero before.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -51,7 +52,7 @@ shared float pixel_transmittance[TILE_PIXELS], pixel_behind[TILE_PIXELS];
 shared float pixel_d_red[TILE_PIXELS], pixel_d_green[TILE_PIXELS], pixel_d_blue[TILE_PIXELS];
 shared float pixel_d_depth[DEPTH_SUM == 1 ? TILE_PIXELS : 1u];
 
-// The blocks that intersections [begin, end) touch, as the bits of an intersection.
+// The blocks that intersections [begin, end) touch, in the bits of an intersection.
 uint touched_blocks(uint begin, uint end) {
     uint bits = 0u;
     for (uint batch = begin; batch < end; batch += SUBGROUP_SIZE) {
@@ -61,7 +62,7 @@ uint touched_blocks(uint begin, uint end) {
     return subgroupOr(bits);
 }
 
-// Packs the pixels that matter; returns their number.
+// Packs the pixels that matter and returns their number.
 uint gather_pixels(uvec2 tile, uint record, uint begin, uint end) {
     const uint bits = touched_blocks(begin, end), plane = args.width * args.height;
     uint count = 0u;
@@ -90,8 +91,8 @@ uint gather_pixels(uvec2 tile, uint record, uint begin, uint end) {
     return count;
 }
 
-// One intersection a thread, all pixels; `local` is the intersection's number within the bucket. A pixel is at thread t
-// in the step that is t after its own number. What leaves at the last thread enters the part before this one.
+// Walks one intersection per thread over all pixels; `local` is the intersection's number within the bucket. A pixel is
+// at thread t in the step that comes t after its own number. What leaves the last thread enters the preceding part.
 Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, float exponent, float z,
           vec4 light) {
     const uint lane = gl_SubgroupInvocationID;
@@ -101,7 +102,7 @@ Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, float expone
     do {
         transmittance = subgroupShuffle(transmittance, max(lane, 1u) - 1u);
         behind = subgroupShuffle(behind, max(lane, 1u) - 1u);
-        const bool here = time - lane < count;  // false also before the first has come, as unsigned
+        const bool here = time - lane < count;  // unsigned, so it is also false before the first has come
         const uint i = here ? time - lane : 0u;
         if (lane == 0u) {
             transmittance = pixel_transmittance[i];

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Gradients of blend.comp as blend_backward_team.comp, but nothing is reduced while splats are walked. All sums of a
+// Computes the same gradients as blend_backward_team.comp, but reduces nothing while splats are walked. All sums of a
 // splat follow from a few numbers of each pixel times constants of the pixel. So these numbers go to shared memory, and
-// after BATCH splats the subgroup turns: a lane has a splat and a part of the block's pixels. Place: after the loss.
-// Source: docs/math.md, Gradients.
-// Numbers of a pixel: G = dL/dq but for a factor of the splat, and W = alpha T. Without LOG_FORM (lib/log_form.glsl)
-// also dL/d(alpha) w and dL/d(exponent). Sums of a splat: the moments of G about the block's centre, from which those of
-// x and dy follow, and W times dL/dcolour.
-// Work: one workgroup a tile, one subgroup of 4 to 32 lanes a block of it, two pixels a lane or more. Shared memory:
-// the numbers of a batch, the tile's dL/dcolour, the chunk's sums; two barriers a chunk. Every intersection of the list
-// is written once, those that nothing reaches with zeros, so that the slots need no zeros before.
-// Lists too long for one dispatch are worked off as in blend_backward.comp.
+// after BATCH splats the subgroup turns: each lane then takes a splat and a part of the block's pixels.
+// Place: after the loss. Source: docs/math.md, Gradients.
+// The numbers of a pixel are G, which is dL/dq up to a factor of the splat, and W = alpha T. Without LOG_FORM
+// (lib/log_form.glsl) there are also dL/d(alpha) w and dL/d(exponent). The sums of a splat are the moments of G about
+// the block's centre, from which those of x and dy follow, and W times dL/dcolour.
+// Work: one workgroup per tile, and one subgroup of 4 to 32 lanes per block of it, with two pixels or more for each
+// lane. Shared memory: the numbers of a batch, the tile's dL/dcolour, the chunk's sums; two barriers per chunk. Every
+// intersection of the list is written once, with zeros where nothing reaches it, so that the slots need not be zero
+// before.
+// Lists that are too long for one dispatch are processed as in blend_backward.comp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -26,7 +27,7 @@ const uint CHUNK = 32u;
 #define PARTIALS_PUT_FOURS
 #include "lib/partials.glsl"
 #include "lib/log_form.glsl"
-// Splats of a batch: each has a lane at least, and four numbers of a pixel leave room for fewer.
+// The splats of a batch. Each needs a lane at least, and four numbers per pixel leave room for fewer.
 const uint MOST = LOG_FORM ? BATCH : 4u;
 const uint SPLATS = MOST < SUBGROUP_SIZE ? MOST : SUBGROUP_SIZE;
 const uint TEAM = AREAS, RECORDS = TEAM * SPLATS;
@@ -34,21 +35,21 @@ const uint TEAM = AREAS, RECORDS = TEAM * SPLATS;
 #include "backward/area_pixels.glsl"
 #include "backward/area_state.glsl"
 
-// Every array has a multiple of 16 bytes, so that all vec4 are read 16 bytes at a time.
-// Two pixels of a lane are a pair, four rows apart: pair 8 row + column of the block's upper half.
+// Every array is a multiple of 16 bytes long, so that all vec4 are read 16 bytes at a time. Two pixels of a lane form a
+// pair, four rows apart: pair 8 row + column of the block's upper half.
 const uint PAIRS = 32u, PAIR_STRIDE = 33u;  // the stride keeps the banks of neighbouring splats apart
 const uint MORE = LOG_FORM ? 1u : TEAM * SPLATS * PAIR_STRIDE;
-shared vec4 pair_shares[TEAM * SPLATS * PAIR_STRIDE];  // G and W of a pair's upper pixel, of its lower one
-shared vec4 pair_more[MORE];                           // dL/d(alpha) w and dL/d(exponent) of both
+shared vec4 pair_shares[TEAM * SPLATS * PAIR_STRIDE];  // G and W of a pair's upper pixel, then of its lower one
+shared vec4 pair_more[MORE];  // dL/d(alpha) w and dL/d(exponent) of both pixels
 shared vec4 pair_colour[TEAM * PAIRS];                 // dL/dcolour: rgb of the upper pixel, r of the lower one
 shared vec2 pair_colour_rest[TEAM * PAIRS];            // gb of the lower one
-shared vec2 pair_depth[DEPTH_SUM == 1 ? TEAM * PAIRS : 2u];  // dL/d(depth) of both
+shared vec2 pair_depth[DEPTH_SUM == 1 ? TEAM * PAIRS : 2u];  // dL/d(depth) of both pixels
 
-// Sums of an intersection over a block: the partials in two halves, and those beside.
+// The sums of an intersection over a block: the partials in two halves, and those beside them.
 const uint OTHERS = RESTS + (SHAPED ? 1u : 0u);
 shared vec4 chunk_halves[TEAM * CHUNK * 2u];
 shared float chunk_others[TEAM * CHUNK * OTHERS];
-shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // per intersection: its slot; its splat and blocks
+shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // for each intersection: its slot; its splat and blocks
 shared uint area_end[TEAM];  // the list's intersections before it reach a pixel of the area
 uint chunk_begin;
 
@@ -66,8 +67,8 @@ void put_colours(Pixels px) {
     }
 }
 
-// A splat at pixel k of the thread, from behind: its numbers, G and W, and the others. Afterwards transmittance and
-// behind are those before it.
+// A splat at pixel k of the thread, from behind. Returns its numbers G and W, and the others. Afterwards transmittance
+// and behind hold their values before the splat.
 vec4 visit(inout Pixels px, uint k, Record r, vec2 offset) {
     float w, slope, by_exponent;
     const float raw = record_alpha(r, offset, w, slope, by_exponent);
@@ -83,14 +84,14 @@ vec4 visit(inout Pixels px, uint k, Record r, vec2 offset) {
     return vec4(d_alpha * (LOG_FORM ? raw : slope), alpha * before, d_alpha * w, d_alpha * by_exponent);
 }
 
-// The batch's records, last to first: each puts its numbers into shared memory.
+// Walks the batch's records, last to first; each puts its numbers into shared memory.
 void visit_batch(inout Pixels px, uint size) {
     const vec2 offset = first_offset();
     uint at = records_base(), turn = 0u;
     uint to = gl_SubgroupID * SPLATS * PAIR_STRIDE + gl_SubgroupInvocationID;
     [[dont_unroll]] do {
         const Record r = load_record(at);
-        [[unroll]] for (uint k = 0u; k < PIXELS / 2u; ++k) {  // a loop would count on lavapipe: LIST_SEGMENT
+        [[unroll]] for (uint k = 0u; k < PIXELS / 2u; ++k) {  // no loop, whose rounds lavapipe counts: LIST_SEGMENT
             const vec4 upper = visit(px, k, r, offset + vec2(slot_offset(k)));
             const vec4 lower = visit(px, k + PIXELS / 2u, r, offset + vec2(slot_offset(k + PIXELS / 2u)));
             pair_shares[to + k * SUBGROUP_SIZE] = vec4(upper.xy, lower.xy);
@@ -101,7 +102,7 @@ void visit_batch(inout Pixels px, uint size) {
     } while (++turn < size);
 }
 
-// Sums over pixels of one splat; (i, j): offset from the block's centre.
+// Sums of one splat over pixels; (i, j) is the offset from the block's centre.
 struct Moments {
     float g, gi, gii, gj, gij, gjj, opacity, exponent, depth;
     vec3 colour;
@@ -114,9 +115,9 @@ float over_parts(float v) {
     return v;
 }
 
-// Sums over a part of a row of pairs; i: from the part's middle.
+// Sums over a part of a row of pairs; i is counted from the part's middle.
 struct RowSums {
-    float both, both_i, both_ii, lower, lower_i;  // sums of both pixels' G, and of the lower one's
+    float both, both_i, both_ii, lower, lower_i;  // sums of G: of both pixels, and of the lower one
 };
 
 void add_pair(inout RowSums s, inout Moments m, uint share, uint colour, float i) {
@@ -138,7 +139,7 @@ void add_pair(inout RowSums s, inout Moments m, uint share, uint colour, float i
     }
 }
 
-// The sums of the lane's splat of the batch over the block's pixels, the same in all lanes of a splat.
+// The sums of the lane's splat of the batch over the block's pixels. All lanes of a splat get the same.
 Moments sum_pixels() {
     const uint splat = gl_SubgroupInvocationID % SPLATS, part = gl_SubgroupInvocationID / SPLATS;
     const bool halves = COLUMNS_OF_PART == 4u;  // parts are half rows
@@ -156,7 +157,7 @@ Moments sum_pixels() {
             s.both_i += middle * s.both;
             s.lower_i += middle * s.lower;
         }
-        const float j = first_j + float(row);  // row of the upper pixels; that of the lower ones is j + 4
+        const float j = first_j + float(row);  // row of the upper pixels; the lower ones have j + 4
         m.g += s.both;
         m.gi += s.both_i;
         m.gii += s.both_ii;
@@ -177,7 +178,7 @@ Moments sum_pixels() {
     return m;
 }
 
-// The sums of splat_sums.glsl, times the opacity, from moments: x = x0 - l11 i - l21 j, dy = dy0 - j.
+// The sums of splat_sums.glsl, times the opacity, from the moments: x = x0 - l11 i - l21 j, dy = dy0 - j.
 void store_sums(Record r, Moments m) {
     const float weight = LOG_FORM ? -0.5 : r.strength, inverse = LOG_FORM ? 1.0 / FACTOR_SCALE : 1.0;
     const float x0 = r.centre.x, dy0 = r.centre.y / r.l22;
@@ -194,7 +195,8 @@ void store_sums(Record r, Moments m) {
     if (SHAPED) chunk_others[OTHERS * place + RESTS] = LOG_FORM ? 0.0 : r.strength * m.exponent;
 }
 
-// As many intersections from `begin` on as there are lanes, those before `end` that touch the block, last to first.
+// Walks as many intersections from `begin` on as there are lanes, those before `end` that touch the block, last to
+// first.
 void walk_stretch(inout Pixels px, uint begin, uint end, uint bits, vec2 centre) {
     const uint j = begin + gl_SubgroupInvocationID;
     uint word = 0u;
@@ -203,12 +205,12 @@ void walk_stretch(inout Pixels px, uint begin, uint end, uint bits, vec2 centre)
     const uvec4 hits = subgroupBallot(hit);
     const uint count = subgroupBallotBitCount(hits);
     if (count == 0u) return;
-    const uint rank = count - 1u - subgroupBallotExclusiveBitCount(hits);  // from the last
+    const uint rank = count - 1u - subgroupBallotExclusiveBitCount(hits);  // counted from the last
     const Record mine = make_record(word & INTERSECTION_SPLAT_MASK, j + 1u, centre);  // splat 0 where nothing hits
     uint done = 0u;
     do {
         const uint size = min(count - done, SPLATS);
-        order_within_subgroup();  // records and numbers may still be read
+        order_within_subgroup();  // other lanes may still read records and numbers
         if (hit && rank - done < SPLATS) store_record(records_base() + (rank - done) * RECORD, mine);
         order_within_subgroup();
         visit_batch(px, size);
@@ -226,7 +228,7 @@ bool has_sums(uint area, uint local) {
     return (chunk_word[local] & area_bits(area)) != 0u && chunk_begin + local < area_end[area];
 }
 
-// A thread for each half of an intersection's partials, and one for each sum beside them.
+// One thread for each half of an intersection's partials, and one for each sum beside them.
 void store_chunk(uint end) {
     const uint count = min(end - chunk_begin, CHUNK);
     for (uint i = gl_LocalInvocationIndex; i < count * (2u + OTHERS); i += THREADS) {

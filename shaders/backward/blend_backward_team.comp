@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Gradients of blend.comp as blend_backward.comp sums them, in the same order of additions, so that both give the same
-// numbers, with TEAM subgroups a tile: each walks the tile's list over an area of its own, a chunk of intersections at a
-// time. Place: after the loss. Source: docs/math.md, Gradients.
-// Work: one workgroup of TEAM subgroups a tile, pixels dealt as in blend.comp. Shared memory: the chunk's sums of every
-// subgroup; three barriers a chunk. Every intersection of the list is written once, those that nothing reaches with
-// zeros, eight neighbouring threads a slot, so that the slots need no zeros before.
-// Lists too long for one dispatch are worked off as in blend_backward.comp.
+// Computes the same gradients as blend_backward.comp with the same order of additions, so that both give the same
+// numbers, but with TEAM subgroups per tile. Each walks the tile's list over an area of its own, a chunk of
+// intersections at a time.
+// Place: after the loss. Source: docs/math.md, Gradients.
+// Work: one workgroup of TEAM subgroups per tile, with pixels dealt as in blend.comp. Shared memory: the chunk's sums
+// of every subgroup; three barriers per chunk. Every intersection of the list is written once by eight neighbouring
+// threads, with zeros where nothing reaches it, so that the slots need not be zero before.
+// Lists that are too long for one dispatch are processed as in blend_backward.comp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -25,7 +26,7 @@ const uint CHUNK = 32u;
 
 const uint TEAM = AREAS, SUMS = PARTIALS + RESTS + (SHAPED ? 1u : 0u);
 shared float chunk_sums[TEAM * CHUNK * SUMS];
-shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // per intersection: its slot; its splat and blocks
+shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // for each intersection: its slot; its splat and blocks
 shared uint area_end[TEAM];  // the list's intersections before it reach a pixel of the area
 uint chunk_begin;
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What is behind each bucket of a pixel's list, dotted with dL/dcolour: the bucket's own light in front of what is
-// behind it, last bucket to first, so that only convex combinations are made and nothing cancels (final colour less
-// the colour so far does, by 3 % after 10,000 layers). Place: between bucket_tiles and blend_backward_buckets.
-// Work: one thread a pixel, one workgroup a block of a tile. Shared memory: none. Reads what the forward pass
-// stored; writes bucket_behind of the records that a pixel sees. Long lists take several dispatches as in
+// Finds what lies behind each bucket of a pixel's list, dotted with dL/dcolour. It puts the bucket's own light in front
+// of what lies behind it, last bucket to first, so that only convex combinations are made and nothing cancels (the
+// final colour less the colour so far does, by 3 % after 10,000 layers).
+// Place: between bucket_tiles and blend_backward_buckets.
+// Work: one thread per pixel, one workgroup per block of a tile. Shared memory: none. Reads what the forward pass
+// stored and writes bucket_behind for the records that a pixel sees. Long lists take several dispatches as in
 // blend_backward.comp; behind holds the pixels' state in between.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -14,7 +15,7 @@
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;  // BLOCK_PIXELS
-layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
+layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list per dispatch; 0: all of them
 layout(constant_id = 31) const int ALPHA_GRADIENT = 0;  // as in blend_backward.comp
 
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
@@ -29,7 +30,7 @@ layout(set = 0, binding = 5, scalar) writeonly buffer BucketBehind { float bucke
 #include "lib/list_part.glsl"
 #include "lib/bucket.glsl"
 
-const float LEAST_TRANSMITTANCE = 1e-30;  // below it nothing has weight, and a quotient none of its bits
+const float LEAST_TRANSMITTANCE = 1e-30;  // below it nothing has weight, and no bit of a quotient is right
 
 void main() {
     const uvec2 tile = gl_WorkGroupID.xy;

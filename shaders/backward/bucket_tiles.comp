@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Which tile each record of lib/bucket.glsl belongs to: its index + 1; records of no bucket are left as they are.
-// Place: first of the backward blend by buckets. Work: one workgroup a tile, one thread a bucket in turn. Shared
-// memory: none.
+// Stores for each record of lib/bucket.glsl the tile to which it belongs, as its index + 1. Records without a bucket
+// are left as they are.
+// Place: first pass of the backward blend by buckets.
+// Work: one workgroup per tile; its threads take the buckets in turn. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// dL/d(camera) of one splat, of the numbers that project.comp computes with, each free: the rotation's nine entries
-// by rows, the centre held, then fx, fy, cx, cy. With CAMERA_GRADIENT; camera_sums.comp or the host adds the splats up,
-// and what the centre does is in dL/d(position). A lens keeps its own terms. Needs camera_model.glsl.
+// dL/d(camera) of one splat, with respect to the numbers that project.comp computes with, each of them free: the
+// rotation's nine entries by rows with the centre held, then fx, fy, cx, cy. Used with CAMERA_GRADIENT;
+// camera_sums.comp or the host adds the splats up, and the effect of the centre is in dL/d(position). A lens keeps its
+// own terms. Needs camera_model.glsl.
 
 layout(constant_id = 30) const int CAMERA_GRADIENT = 0;
 
 // dL/df and dL/dc through one row of the Jacobian, (f/z, ., -f ratio/z). Where the ratio is held at the picture's
-// margin, the last entry depends on c, but not on f. d: gradients of the row's first and last entry.
+// margin, the last entry depends on c but not on f. d: gradients of the row's first and last entry.
 vec2 focal_gradient(vec2 d, float ratio, float free_ratio, float z, float d_pixel) {
     const bool held = ratio != free_ratio;
     return vec2(d_pixel * free_ratio + (d.x - (held ? 0.0 : d.y * ratio)) / z,
@@ -23,7 +24,7 @@ void store_camera_gradient(CameraData camera, uint i, vec3 p, vec3 to_splat, vec
     const vec2 free = p.xy / p.z, ratio = clamped_ratio(camera, free);
     vec2 of_x = focal_gradient(d_j[0].xz, ratio.x, free.x, p.z, d_mean.x);
     vec2 of_y = focal_gradient(d_j[1].yz, ratio.y, free.y, p.z, d_mean.y);
-    if (distorts(camera)) {  // pixel and rows go with f; what holds the ratio is the lens's own
+    if (distorts(camera)) {  // pixel and rows scale with f; the limit of the ratio belongs to the lens
         const vec2 value = lens_point(camera, free).value;
         of_x = vec2(d_mean.x * value.x + dot(d_j[0], j[0]) / camera.focal.x, d_mean.x);
         of_y = vec2(d_mean.y * value.y + dot(d_j[1], j[1]) / camera.focal.y, d_mean.y);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Adds dL/d(camera) and dL/d(position) up over the splats, in a fixed order: bit-equal from run to run. Place: after
-// project_backward with CAMERA_GRADIENT. Work: CAMERA_SUM_THREADS threads a group; each thread adds every
-// groups * CAMERA_SUM_THREADS-th splat, then a tree in shared memory. Reads shares and positions' gradients; writes
-// CAMERA_SUMS floats a group, which the host adds in double.
+// Adds dL/d(camera) and dL/d(position) up over the splats in a fixed order, so that every run gives the same bits.
+// Place: after project_backward with CAMERA_GRADIENT.
+// Work: CAMERA_SUM_THREADS threads per group; each thread adds every groups * CAMERA_SUM_THREADS-th splat, and then a
+// tree in shared memory adds the threads. Reads shares and positions' gradients; writes CAMERA_SUMS floats per group,
+// which the host adds in double.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Sums a splat's partials over its tiles, takes them back through the projection to its parameters and does
-// the Adam step there (UPDATE_ADAM), or leaves the gradients in buffers, in place of what they hold (UPDATE_STORE)
-// or added to it (UPDATE_ADD): adam_update.comp makes the step of these.
-// With REST_GATHER the harmonics above the first band of a splat in view add to rest_sum instead.
+// Sums a splat's partials over its tiles and takes them back through the projection to its parameters. Then it either
+// does the Adam step (UPDATE_ADAM), or stores the gradients in buffers (UPDATE_STORE) or adds them to what these hold
+// (UPDATE_ADD), for which adam_update.comp does the step. With REST_GATHER, the harmonics above the first band of a
+// splat in view are added to rest_sum instead.
 // Place: last pass of an iteration. Source: docs/math.md, Gradients and Optimizer.
-// Work: one thread a splat, all N of them: Adam is dense, an unseen splat's moments decay and move it.
-// Shared memory: none. Does nothing when the frame overflowed its intersection buffers: the host repeats it.
-// A splat whose gradient is not finite, or whose square is not, is counted and left as it is for this step.
+// Work: one thread per splat, for all N of them: Adam is dense, so an unseen splat's moments decay and move it. Shared
+// memory: none. Does nothing when the frame overflowed its intersection buffers, because the host repeats it. A splat
+// with a gradient that is not finite, or whose square is not, is counted and left alone for this step.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -33,10 +33,11 @@ layout(set = 0, binding = 1 + ATTRIBUTE_LOG_SCALE, scalar) buffer LogScale { vec
 layout(set = 0, binding = 1 + ATTRIBUTE_ROTATION, scalar) buffer Rotation { vec4 rotation[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_OPACITY_LOGIT, scalar) buffer OpacityLogit { float opacity_logit[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_SH_DC, scalar) buffer ShDc { vec3 sh_dc[]; };
-layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) buffer ShRest { vec4 sh_rest[]; };  // from first_splat on, as m_sh_rest and d_sh_rest
+// from first_splat on, as m_sh_rest and d_sh_rest
+layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) buffer ShRest { vec4 sh_rest[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_SHAPE, scalar) buffer Shape { float shape[]; };  // with SHAPED, as the next two
 
-// Moments with UPDATE_ADAM, else gradients.
+// The moments with UPDATE_ADAM, otherwise the gradients.
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_POSITION, scalar) buffer MPosition { Moments3 m_position[]; };
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_LOG_SCALE, scalar) buffer MLogScale { Moments3 m_log_scale[]; };
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_ROTATION, scalar) buffer MRotation { mat2x4 m_rotation[]; };
@@ -58,7 +59,8 @@ layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer PartialRest
 layout(set = 0, binding = FRAME_BINDING + 8, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // norms, views
 layout(set = 0, binding = FRAME_BINDING + 9, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = FRAME_BINDING + 10, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world
-layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer RestSum { vec4 rest_sum[]; };  // as sh_rest, but with REST_EACH
+// as sh_rest; not with REST_EACH
+layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer RestSum { vec4 rest_sum[]; };
 layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer CameraGradient { float camera_gradient[]; };  // [N][13] with CAMERA_GRADIENT
 layout(set = 0, binding = FRAME_BINDING + 12, scalar) readonly buffer PartialExponent { float partial_exponent[]; };  // with SHAPED
 
@@ -83,7 +85,7 @@ Partial sum_partials(uint i) {
     uint e = first_intersection[i];
     const uint end = e + intersection_count[i];
     for (uint stop = e; e < end;) {
-        stop = min(stop + 32768u, end);  // some drivers end loops at 65,535
+        stop = min(stop + 32768u, end);  // some drivers end loops after 65,535 rounds
         for (; e < stop; ++e) {
             const vec4 light = load_partial(e, 1u);
             sums.a += load_partial(e, 0u);
@@ -104,7 +106,7 @@ bool finite(SplatGradient g) {
     return below(max(max(ellipsoid, light), shape), GRADIENT_LIMIT);
 }
 
-// What becomes of an attribute's gradient.
+// Applies an attribute's gradient as UPDATE says.
 #define UPDATE_ATTRIBUTE(Moments, value, moments, stored, gradient, attribute) \
     if (UPDATE == UPDATE_ADAM) {                                               \
         Moments m = moments;                                                   \
@@ -114,7 +116,8 @@ bool finite(SplatGradient g) {
         stored = UPDATE == UPDATE_ADD ? stored + (gradient) : (gradient);      \
     }
 
-// Column c of the harmonics. Beyond the degree in use nothing changes; a column that is in use in part is with its x.
+// The step of column c of the harmonics. Nothing changes beyond the degree in use; a column that is partly in use has
+// at least its x in use.
 void step_column(uint row, int c, vec4 gradient) {
     const bool whole = 4 * c + 4 <= 3 * SH_USED;
     const uint at = column_at(row, uint(c), COLUMNS), moments_at = column_at(row, uint(2 * c), 2u * COLUMNS);
@@ -132,7 +135,7 @@ void step_column(uint row, int c, vec4 gradient) {
     sh_rest[at] = value;
 }
 
-// The gradient of column c, 0 beyond the degree in use.
+// Applies the gradient of column c, which is 0 beyond the degree in use.
 void update_column(uint row, int c, vec4 gradient) {
     if (4 * c >= 3 * SH_USED) return;
     const uint at = column_at(row, uint(c), COLUMNS);
@@ -181,7 +184,8 @@ void update_splat(uint i, SplatGradient g) {
     const bool shows = intersection_count[i] > 0u;
     const bool steps = shows || (UPDATE == UPDATE_ADAM && REST != REST_GATHER);
     if (SH_DEGREE > 0 && steps) update_rest(i, g);
-    if (UPDATE == UPDATE_STORE)  // the bands beyond the degree in use; all of what the view does not show: no -0
+    // bands beyond the degree in use, and all of what the view does not show; there must be no -0
+    if (UPDATE == UPDATE_STORE)
         for (uint c = shows ? 3u * uint(FOURS) : 0u; c < COLUMNS; ++c)
             d_sh_rest[column_at(i - args.first_splat, c, COLUMNS)] = vec4(0.0);
 }
@@ -209,7 +213,7 @@ void main() {
     const uint i = args.first_splat + linear_id();
     if (i >= args.splat_end || status.overflow != 0u) return;
     SplatGradient g = no_gradient();
-    vec2 shown = vec2(0.0);  // norm of the gradient of the mean, NDC; 1
+    vec2 shown = vec2(0.0);  // norm of the gradient of the mean, NDC; 1 where it is shown
     if (CAMERA_GRADIENT == 1 && intersection_count[i] == 0u) clear_camera_gradient(i);
     if (intersection_count[i] > 0u) {
         const CameraData camera = cameras[args.camera_index];
@@ -229,8 +233,8 @@ void main() {
         gradient_sum[i] = shown;
     else if (intersection_count[i] > 0u)
         gradient_sum[i] += shown;
-    // Adam makes a step of full length of any gradient that comes alone: at all frames that do not show a splat the
-    // regularisers would take, in a large set, what a few of its photos never get to hold up.
+    // Adam makes a step of full length from any gradient that comes alone. If the regularisers acted in every frame
+    // that does not show a splat, they would, in a large set, remove splats that their few photos never get to keep.
     if (UPDATE == UPDATE_ADAM && (intersection_count[i] > 0u || args.regularise_unseen == 1u)) regularise(i, g);
     update_splat(i, g);
 }

@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: MIT
-// From the summed partials of one splat to the gradients of its parameters: the exact derivative of project.comp.
+// Takes the summed partials of one splat to the gradients of its parameters: the exact derivative of project.comp.
 // Source: docs/math.md, Gradients. Needs camera data, covariance.glsl, rest.glsl and the parameter buffers.
 
 struct SplatGradient {
-    vec3 position, log_scale;  // with LINEAR_VALUES those of scale and, below, opacity
+    vec3 position, log_scale;  // with LINEAR_VALUES those of the scale and, below, of the opacity
     vec4 rotation;
     float opacity_logit, shape;
-    vec3 colour;          // gradient of the unclamped SH sum
-    vec3 direction;       // unit, camera to splat: the SH basis is evaluated there
+    vec3 colour;  // gradient of the SH sum before it is clamped
+    vec3 direction;  // unit, camera to splat; the SH basis is evaluated there
     vec2 mean;            // px
 };
 
 struct Partial {
     vec4 a;               // sums over pixels of G x, G x x, G x dy, G dy; G = opacity dL/dalpha dw/dq
     float b;              // G dy dy
-    float d_opacity, d_exponent, d_depth;  // d_depth: 0 but with DEPTH_SUM
+    float d_opacity, d_exponent, d_depth;  // d_depth: 0 without DEPTH_SUM
     vec3 d_colour;
 };
 
-// The rows of N = L M, L the factor [[l11, l21], [0, l22]], M with the rows r1 and r2: (x, y) = L d, so a
-// change of M moves q by -2 (x, y) L dM N^T (x, y)^T. Entries are at most 1 whatever the splat's shape.
-// l11 r1 + l21 r2 cancels on needles; the same by r2 x (r1 x r2) = |r2|^2 r1 - (r1 r2) r2 does not. l11 / c of the
-// shrunk rows is 1 / sqrt(c determinant).
+// The rows of N = L M, with the factor L = [[l11, l21], [0, l22]] and M with the rows r1 and r2. As (x, y) = L d, a
+// change of M moves q by -2 (x, y) L dM N^T (x, y)^T. Entries are at most 1 whatever the splat's shape. The form l11 r1
+// + l21 r2 cancels on needles; the equal r2 x (r1 x r2) = |r2|^2 r1 - (r1 r2) r2 does not. l11 / c of the shrunk rows
+// is 1 / sqrt(c determinant).
 void whitened_rows(Factor f, vec3 r1, vec3 r2, out vec3 n1, out vec3 n2) {
     r1 *= f.shrink;
     r2 *= f.shrink;
@@ -30,8 +30,8 @@ void whitened_rows(Factor f, vec3 r1, vec3 r2, out vec3 n1, out vec3 n2) {
     n2 = l22 * r2;
 }
 
-// dL/d(r1), dL/d(r2), the rows of M; dL/d(log scale), which is d_r1 r1 + d_r2 r2 without its cancellation; dL/dmean.
-// peak: what the opacity is before compensation(), whose share is added with ANTIALIAS.
+// dL/d(r1) and dL/d(r2), the rows of M; dL/d(log scale), which is d_r1 r1 + d_r2 r2 without its cancellation; dL/dmean.
+// peak: the opacity before compensation(), whose share is added with ANTIALIAS.
 void factor_gradient(Factor f, Partial p, vec3 r1, vec3 r2, float peak, out vec3 d_r1, out vec3 d_r2,
                      out vec3 d_log_scale, out vec2 d_mean) {
     d_mean = 2.0 * vec2(f.l11 * p.a.x, f.l21 * p.a.x + f.l22 * f.l22 * p.a.w);
@@ -46,7 +46,7 @@ void factor_gradient(Factor f, Partial p, vec3 r1, vec3 r2, float peak, out vec3
     d_r2 = f.l21 * p1 + f.l22 * p2;
 }
 
-// dL/dq of a unit quaternion from dL/d(columns of its matrix).
+// dL/dq of a unit quaternion, from dL/d(columns of its matrix).
 vec4 quaternion_gradient(vec4 q, mat3 d) {
     const float w = q.x, x = q.y, y = q.z, z = q.w;
     return 2.0 *
@@ -70,7 +70,7 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     const vec3 raw_scale = log_scale[i];
     vec3 s = scale_of(raw_scale), share = vec3(1.0);
     const vec3 scale = s;
-    float kept = 1.0;  // share of the opacity that the filters keep
+    float kept = 1.0;  // share of the opacity that the filters leave
     if (SMOOTHING == 1) kept = smooth_scale(s, smoothing[i], share);
     float exponent = 0.0, by_shape = 0.0;
     if (SHAPED) exponent = shape_exponent(shape[i], by_shape);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What one splat and one pixel give to the gradients of an intersection, walking back to front: T before a splat is T
-// after it / (1 - alpha), and 1 - alpha >= 0.01 by ALPHA_MAX; what is behind, dotted with dL/dcolour, is a convex
+// What one splat at one pixel adds to the gradients of an intersection, walking back to front. T before a splat is T
+// after it / (1 - alpha), with 1 - alpha >= 0.01 by ALPHA_MAX. What lies behind, dotted with dL/dcolour, is a convex
 // combination, so nothing cancels. Needs kernels/kernel.glsl.
 
-// Sums over pixels; G = opacity dL/dalpha dw/dq without the opacity, as that of the exponent, with SHAPED.
+// Sums over pixels. G = opacity dL/dalpha dw/dq, here without the opacity; so is the exponent's, with SHAPED.
 struct Sums {
     float gx, gxx, gxdy, gdy, gdydy, opacity, exponent, depth;
     vec3 colour;
@@ -11,8 +11,8 @@ struct Sums {
 
 const Sums NO_SUMS = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vec3(0.0));
 
-// to_mean: mean - centre of the pixel. reached: the pixel had not ended before this splat. On entry transmittance
-// and behind are those behind the splat, afterwards those before it. z, d_z: with DEPTH_SUM, else 0.
+// to_mean: mean - centre of the pixel. reached: the pixel had not ended before this splat. On entry transmittance and
+// behind belong to what lies behind the splat, afterwards to what lies before it. z, d_z: with DEPTH_SUM, otherwise 0.
 void add_pixel(inout Sums s, inout float transmittance, inout float behind, vec2 to_mean, vec4 shape,
                float l22, vec4 light, float exponent, float z, vec3 d_colour, float d_z, bool reached) {
     const float x = shape.z * to_mean.x + shape.w * to_mean.y, y = l22 * to_mean.y;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The chunk of a tile's list that a team works off. Needs CHUNK, THREADS, chunk_begin, chunk_slot and chunk_word.
+// The chunk of a tile's list on which a team works. Needs CHUNK, THREADS, chunk_begin, chunk_slot and chunk_word.
 
 void load_chunk(uint end) {
     for (uint i = gl_LocalInvocationIndex; chunk_begin + i < end && i < CHUNK; i += THREADS) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Constants and buffers of blend_backward_team.comp and blend_backward_pixels.comp: the same, in the same places.
+// The constants and buffers that blend_backward_team.comp and blend_backward_pixels.comp share, at the same bindings.
 
 #include "shared/limits.h"
 #include "shared/render_args.h"
@@ -7,8 +7,8 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 128;  // AREAS * SUBGROUP_SIZE
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 32;
-layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
-layout(constant_id = 31) const int ALPHA_GRADIENT = 0;  // 1: d_image has a plane more, dL/d(1 - transmittance)
+layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list per dispatch; 0: all of them
+layout(constant_id = 31) const int ALPHA_GRADIENT = 0;  // 1: d_image has one more plane, dL/d(1 - transmittance)
 
 #include "kernels/kernel.glsl"
 layout(push_constant, scalar) uniform Push { BlendArgs args; };

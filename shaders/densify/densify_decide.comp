@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Decides for every splat whether density control keeps, clones, splits or prunes it.
-// Source: docs/math.md, Density control; 3DGS section 5, graphdeco's thresholds. Place: between iterations.
-// Work: one thread a splat. Shared memory: none. Writes keep (0, 1) and grow (0, 1) for their scans.
+// Place: between iterations. Source: docs/math.md, Density control; 3DGS section 5, with the thresholds of graphdeco's
+// program.
+// Work: one thread per splat. Shared memory: none. Writes keep (0, 1) and grow (0, 1) for their scans.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Where each splat of the next generation comes from. Kept splats close up in order; a clone's copy and a split's
-// second child go behind them. Place: after the scans of keep and grow.
-// Work: one thread an old splat. Shared memory: none.
+// Finds where each splat of the next generation comes from. Kept splats close up in order; a clone's copy and a split's
+// second child go behind them.
+// Place: after the scans of keep and grow.
+// Work: one thread per old splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

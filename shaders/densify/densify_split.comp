@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Moves and shrinks the children of split splats: an offset drawn from the kernel's own radial density, in the
-// parent's frame, and scale / 1.6. Place: after the gathers. Source: docs/math.md, Density control; 3DGS section 5.
-// Work: one thread a new splat. Shared memory: none.
+// Moves and shrinks the children of split splats: their offset is drawn from the kernel's own radial density in the
+// parent's frame, and their scale is the parent's / 1.6.
+// Place: after the gathers. Source: docs/math.md, Density control; 3DGS section 5.
+// Work: one thread per new splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -20,7 +21,7 @@ layout(constant_id = 1) const uint QUANTILES = 256;
 #include "lib/random.glsl"
 #include "densify/shape_rows.glsl"
 
-layout(push_constant, scalar) uniform Push { DensifyArgs args; };  // splat_count: after
+layout(push_constant, scalar) uniform Push { DensifyArgs args; };  // splat_count: the count after
 layout(set = 0, binding = 0, scalar) readonly buffer Sources { uvec2 sources[]; };
 layout(set = 0, binding = 1, scalar) buffer Position { vec3 position[]; };
 layout(set = 0, binding = 2, scalar) buffer LogScale { vec3 log_scale[]; };
@@ -30,7 +31,7 @@ layout(set = 0, binding = 5, scalar) readonly buffer Shape { float shape[]; };  
 
 const float SPLIT_SHRINK = 1.6;
 
-// Radius by linear interpolation between the quantiles at (k + 0.5) / QUANTILES.
+// Draws a radius by linear interpolation between the quantiles at (k + 0.5) / QUANTILES.
 float draw_radius(float u, uint row) {
     const float at = clamp(u * float(QUANTILES) - 0.5, 0.0, float(QUANTILES - 1u));
     const uint k = min(uint(at), QUANTILES - 2u);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Moves one attribute to the next generation's order; new splats copy their source, or start at zero (moments).
-// Place: after densify_sources, once an attribute and pair of ranges; every source lies in one range.
-// Work: one thread a float, with COLUMNS a column of what lies in blocks (lib/rows.glsl). Shared memory: none.
+// Moves one attribute to the next generation's order; new splats copy their source or, for moments, start at zero.
+// Place: after densify_sources, once for each attribute and pair of ranges; every source lies in one range.
+// Work: one thread per float, or with COLUMNS per column of what lies in blocks (lib/rows.glsl). Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -29,7 +29,7 @@ void main() {
     const uint splat = COLUMNS == 1 ? at / (args.stride * ROW_BLOCK) * ROW_BLOCK + at % ROW_BLOCK : at / args.stride;
     if (splat >= args.to_count) return;
     const uvec2 source = sources[args.to_first + splat];
-    const uint row = source.x - args.from_first;  // beyond the range where it lies before it, too
+    const uint row = source.x - args.from_first;  // also beyond the range where the source lies before it
     if (row >= args.from_count) return;
     const bool zero = args.clear_new == 1u && source.y != DENSIFY_KEEP;
     if (COLUMNS == 1)

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The place of each splat on a space-filling curve: the bits of its cell's three numbers in turn (Morton 1966).
-// What lies outside of the grid counts to the cell at its border, what has no place to the last cell of all.
-// Place: before the sort of splats after density control. Work: one thread a splat. Shared memory: none.
+// The place of each splat on a space-filling curve: the bits of its cell's three numbers in turn (Morton 1966). Splats
+// outside the grid count as in the cell at its border, and those without a finite position as in the last cell of all.
+// Place: before the sort of splats after density control.
+// Work: one thread per splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -18,7 +19,7 @@ layout(push_constant, scalar) uniform Push { MortonArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Position { vec3 position[]; };
 layout(set = 0, binding = 1, scalar) writeonly buffer Key { uint key[]; };
 
-// Ten bits, two places apart.
+// Spreads ten bits two places apart.
 uint spread(uint bits) {
     bits = (bits | (bits << 16)) & 0x030000FFu;
     bits = (bits | (bits << 8)) & 0x0300F00Fu;

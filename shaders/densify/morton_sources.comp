@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The sorted order as gather_attribute reads it: every splat is kept, none is new. Place: after the sort by
-// morton_key. Work: one thread a splat. Shared memory: none.
+// The sorted order in the form that gather_attribute reads: every splat is kept and none is new.
+// Place: after the sort by morton_key.
+// Work: one thread per splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Noise on positions: the covariance times a normal vector, for splats that are nearly transparent, so that they find
-// places where something is missing. Place: mcmc, after every step of the optimiser.
-// Source: 3DGS-MCMC (arXiv 2404.09591) equation 8; the gate sigmoid(-100 (opacity - 0.005)) is its authors' choice.
-// Work: one thread a splat. Shared memory: none. Does nothing when the frame overflowed its intersection buffers.
+// Adds noise to positions, the covariance times a normal vector, for splats that are nearly transparent, so that they
+// find places where something is missing.
+// Place: mcmc, after every step of the optimiser. Source: 3DGS-MCMC (arXiv 2404.09591) equation 8; the gate
+// sigmoid(-100 (opacity - 0.005)) is its authors' choice.
+// Work: one thread per splat. Shared memory: none. Does nothing when the frame overflowed its intersection buffers.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -27,7 +28,7 @@ layout(set = 0, binding = 4, scalar) readonly buffer Status { FrameStatus status
 
 const float GATE_SLOPE = 100.0;
 
-// Two normal numbers, Box and Muller 1958.
+// Two normal numbers (Box and Muller 1958).
 vec2 random_normals(inout uint state) {
     const float radius = sqrt(-2.0 * log(1.0 - random_uniform(state)));
     const float angle = 6.28318530718 * random_uniform(state);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What a splat becomes when several stand in its place and the picture is to stay: each lets through the count-th
-// root of what it let through, and is scaled by the kernel's own factor. Place: mcmc, after the gathers.
-// Source: 3DGS-MCMC (arXiv 2404.09591) equation 9; for any kernel docs/math.md, engine/kernels/relocation_table.h.
-// Work: one thread a new splat. Shared memory: none.
+// Changes a splat where several take its place and the picture should stay the same: each transmits the count-th root
+// of what the one transmitted, and is scaled by a factor of the kernel's.
+// Place: mcmc, after the gathers. Source: 3DGS-MCMC (arXiv 2404.09591) equation 9; docs/math.md and
+// engine/kernels/relocation_table.h have it for any kernel.
+// Work: one thread per new splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -26,7 +27,7 @@ layout(set = 0, binding = 3, scalar) buffer LogScale { vec3 log_scale[]; };
 layout(set = 0, binding = 4, scalar) buffer Opacity { float opacity_logit[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Shape { float shape[]; };  // with SHAPES > 1
 
-// -log(1 - opacity), to the last bits for small opacities, too.
+// -log(1 - opacity), exact to the last bits for small opacities, too.
 float absorption(float logit) {
     if (logit > 10.0) return logit + exp(-logit);
     const float e = exp(logit);
@@ -38,7 +39,7 @@ float logit_of(float a) {
     return a > 0.5 ? log(exp(a) - 1.0) : log(a) + 0.5 * a + a * a * (1.0 / 24.0 - a * a / 2880.0);
 }
 
-// Between the columns, at (k + 1/2) / RELOCATION_OPACITIES, and 1 at opacity 0.
+// Interpolates between the columns, which are at (k + 1/2) / RELOCATION_OPACITIES, and takes 1 at opacity 0.
 float scale_factor(float opacity, uint count, uint shape) {
     const uint row = (shape * RELOCATION_COUNTS + count - 1u) * RELOCATION_OPACITIES;
     const float at = opacity * float(RELOCATION_OPACITIES) - 0.5;
@@ -51,7 +52,7 @@ void main() {
     const uint i = linear_id();
     if (i >= args.splats_after || sources[i].y == DENSIFY_KEEP) return;
     const uint count = min(copies[sources[i].x] + 1u, RELOCATION_COUNTS);
-    const float limit = log(ALPHA_MAX / (1.0 - ALPHA_MAX));  // more than that is never blended
+    const float limit = log(ALPHA_MAX / (1.0 - ALPHA_MAX));  // a larger opacity is never blended
     const float logit = min(opacity_logit[i], limit);
     const float opacity = 1.0 / (1.0 + exp(-logit));
     float factor, part;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// One live splat for each dead and each new one, drawn in proportion to the weights, and how often each was drawn.
+// Draws one live splat for each dead and each new one, in proportion to the weights, and counts how often each was
+// drawn.
 // Place: mcmc, after the scan of the weights. Source: 3DGS-MCMC (arXiv 2404.09591) section 3.
-// Work: one thread a draw. Shared memory: none. The counts are integer sums: the same in any order.
+// Work: one thread per draw. Shared memory: none. The counts are integer sums, so they are the same in any order.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -24,7 +25,8 @@ void main() {
     if (draw >= args.dead_count + (args.splats_after - args.splat_count)) return;
     uint at, ignored;  // at: uniform in [0, weight_total)
     umulExtended(random_hash(random_seed(args.seed, draw)), args.weight_total, at, ignored);
-    // The last splat whose sum does not exceed it: its weight is not 0, or the next would have the same sum.
+    // Finds the last splat whose sum does not exceed `at`. Its weight is not 0, or the next one would have the same
+    // sum.
     uint first = 0u, count = args.splat_count;
     while (count > 1u) {
         const uint half_count = count / 2u;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Where each splat of the next generation comes from: a live one stays in its place, a dead one's place and the places
-// behind the last go to the splats that were drawn. What is drawn counts as new itself: it changes, too.
-// Place: mcmc, after the draws and the scan of the dead. Work: one thread a new splat. Shared memory: none.
+// Finds where each splat of the next generation comes from. A live splat stays in its place; a dead one's place and the
+// places behind the last go to the splats that were drawn. A drawn splat counts as new itself, because it changes, too.
+// Place: mcmc, after the draws and the scan of the dead.
+// Work: one thread per new splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Who is dead, and with what integer weight the others are drawn: in proportion to their opacity. Integers, so that
-// their scan is exact and a draw depends on no order of sums.
+// Finds which splats are dead, and the integer weights with which the others are drawn, in proportion to their opacity.
+// The weights are integers so that their scan is exact and a draw does not depend on the order of sums.
 // Place: mcmc, before the scans. Source: 3DGS-MCMC (arXiv 2404.09591) section 3.
-// Work: one thread a splat. Shared memory: none. Writes dead (0, 1) and weight, and sets copies to 0.
+// Work: one thread per splat. Shared memory: none. Writes dead (0, 1) and weight, and sets copies to 0.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -24,7 +24,7 @@ void main() {
     const uint i = linear_id();
     if (i >= args.splat_count) return;
     const float opacity = 1.0 / (1.0 + exp(-opacity_logit[i]));
-    const bool lives = opacity > args.dead_opacity;  // false for what is no number
+    const bool lives = opacity > args.dead_opacity;  // false for NaN
     dead[i] = lives ? 0u : 1u;
     weight[i] = lives ? max(uint(opacity * args.weight_scale), 1u) : 0u;
     copies[i] = 0u;

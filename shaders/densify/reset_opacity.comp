@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Opacity reset: every opacity down to at most the given one, its moments to zero. Place: between iterations.
-// Work: one thread a splat. Shared memory: none.
+// Resets opacities: lowers every opacity to at most the given one and sets its moments to zero.
+// Place: between iterations.
+// Work: one thread per splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From a point in the camera to its pixel, the rows of the Jacobian there, and their gradients. The camera is a
-// pinhole; OFF_CENTRE and LENS of effects/constants.glsl say what else it is. Needs covariance.glsl.
+// Takes a point in the camera to its pixel, with the rows of the Jacobian there and their gradients. The camera is a
+// pinhole unless OFF_CENTRE and LENS of effects/constants.glsl say more. Needs covariance.glsl.
 
 #include "shared/lens.h"
 #include "effects/lens.glsl"
@@ -9,8 +9,9 @@ vec2 principal_point(CameraData camera) {
     return OFF_CENTRE == 1 ? camera.principal : 0.5 * vec2(camera.width, camera.height);
 }
 
-// (x/z, y/z) as the Jacobian sees them: within the image and a margin around it. Without the clamp a splat beside
-// the camera, large against its depth, would fan out over the picture; it costs nothing where there is none.
+// (x/z, y/z) as the Jacobian sees them: limited to the image and a margin around it. Without the limit a splat beside
+// the camera that is large against its depth would fan out over the picture. The limit costs nothing where there is no
+// such splat.
 vec2 clamped_ratio(CameraData camera, vec2 ratio) {
     if (NEAR_CARE == 0) return ratio;
     return clamp(ratio, OFF_CENTRE == 1 ? camera.ratio_min : -camera.ratio_max, camera.ratio_max);
@@ -19,7 +20,7 @@ vec2 clamped_ratio(CameraData camera, vec2 ratio) {
 // A camera without lens terms is a pinhole, by the same arithmetic whether lenses are compiled in or not.
 bool distorts(CameraData camera) { return LENS == 1 && camera.lens_fold < LENS_FOLD_NONE; }
 
-// False where no pixel sees the point.
+// Returns false where no pixel sees the point.
 bool pixel_of(CameraData camera, vec3 p, out vec2 pixel) {
     if (distorts(camera)) {
         const LensPoint at = lens_point(camera, p.xy / p.z);
@@ -30,7 +31,7 @@ bool pixel_of(CameraData camera, vec3 p, out vec2 pixel) {
     return true;
 }
 
-// Rows j0, j1 of the projection's Jacobian at camera-space p.
+// Rows j0, j1 of the projection's Jacobian at p, in camera space.
 void jacobian_rows(CameraData camera, vec3 p, out vec3 j0, out vec3 j1) {
     const vec2 ratio = clamped_ratio(camera, p.xy / p.z);
     j0 = vec3(camera.focal.x / p.z, 0.0, -camera.focal.x * ratio.x / p.z);
@@ -43,8 +44,8 @@ void jacobian_rows(CameraData camera, vec3 p, out vec3 j0, out vec3 j1) {
     }
 }
 
-// One row of the pinhole's Jacobian, (f/z, ., -f ratio/z): its share of dL/d(coordinate) and dL/dz.
-// d: gradients of the row's first and last entry.
+// The share of one row of the pinhole's Jacobian, (f/z, ., -f ratio/z), in dL/d(coordinate) and dL/dz. d: gradients of
+// the row's first and last entry.
 vec2 jacobian_row_gradient(float focal, float coordinate, float z, float ratio, vec2 limits, vec2 d) {
     const float inverse = 1.0 / z;
     float d_z = focal * inverse * inverse * (ratio * d.y - d.x);
@@ -69,7 +70,7 @@ vec3 lens_point_gradient(CameraData camera, vec3 p, vec3 d_j0, vec3 d_j1, vec2 d
     const vec2 d_row = -f * vec2(d_j0.z, d_j1.z);
     vec2 d_ratio = d_row * d + lens_second(camera, ratio, at, C);
     if (NEAR_CARE == 1) d_ratio = mix(vec2(0.0), d_ratio, equal(ratio, free));
-    // The Jacobian as a whole goes with 1/z.
+    // The Jacobian as a whole scales with 1/z.
     const float along = C[0][0] * d[0][0] + C[0][1] * d[0][1] + C[1][0] * d[1][0] + C[1][1] * d[1][1];
     const vec2 d_free = (camera.focal * d_pixel) * lens_jacobian(lens_point(camera, free)) + d_ratio;
     return vec3(d_free * inverse, -(dot(d_free, free) + along) * inverse);

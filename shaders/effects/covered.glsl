@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the splats alone leave at a pixel, beside the background that is seen through them. The includer declares args,
+// What the splats alone leave at a pixel, without the background that is seen through them. The includer declares args,
+// image and final_transmittance.
 // image and final_transmittance.
 
 vec3 background() {

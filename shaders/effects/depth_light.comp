@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Puts (depth, 1, 0) in the place of each projected splat's colour: blended again over black, the picture holds
-// sum w z and sum w, whose quotient is the expected depth. Place: after a frame, before blend runs once more.
-// Work: one thread a splat. Shared memory: none. Reads depths; writes the colours of the projected splats.
+// Replaces the colour of each projected splat by (depth, 1, 0). Blended again over black, the picture then holds sum w
+// z and sum w, whose quotient is the expected depth.
+// Place: after a frame, before blend runs once more.
+// Work: one thread per splat. Shared memory: none. Reads depths; writes the colours of the projected splats.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

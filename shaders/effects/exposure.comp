@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Maps the colours of a picture by its photo's exposure, an affine 3 x 4 matrix: those of the splats alone, as if each
-// splat's colour were mapped. The background is in no photo and stays as it is. Place: between blend and loss, in
-// training alone. Source: per-image exposure of 3DGS (2024) and of NeRF in the Wild's affine form.
-// Work: one thread a pixel. Shared memory: none. Reads picture, transmittance and maps; writes the mapped picture.
+// Maps the colours of a picture by its photo's exposure, an affine 3 x 4 matrix. It maps the light of the splats alone,
+// as if each splat's colour were mapped; the background is in no photo and stays as it is.
+// Place: between blend and loss, only in training. Source: the per-image exposure of 3DGS (2024), and the affine form
+// of NeRF in the Wild.
+// Work: one thread per pixel. Shared memory: none. Reads picture, transmittance and maps; writes the mapped picture.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

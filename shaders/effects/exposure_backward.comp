@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The gradient of exposure.comp: d_image becomes that of the picture before the map, and every group sums
-// the map's own gradient, the same in every run. What is covered counts for the map's offset, which the picture's
-// gradient does not tell: that goes to the plane dL/d(1 - transmittance). Place: between loss and blend_backward.
-// Work: groups of EXPOSURE_THREADS walk over the pixels in strides. Shared memory: 12 floats a thread, which a thread a
-// term adds up: as a tree, with a barrier for each level, the pass takes 3.5 times as long on a CPU. Reads the picture
-// before the map, transmittance, d_image; writes d_image, partial sums [groups][12].
+// The gradient of exposure.comp. d_image becomes the gradient of the picture before the map, and every group sums the
+// map's own gradient, the same in every run. The covered share of a pixel scales the map's offset, which the picture's
+// gradient does not show: that part goes to the plane dL/d(1 - transmittance).
+// Place: between loss and blend_backward.
+// Work: groups of EXPOSURE_THREADS walk over the pixels in strides. Shared memory: 12 floats per thread, added up by
+// one thread per term; as a tree with a barrier for each level, the pass takes 3.5 times as long on a CPU. Reads the
+// picture before the map, transmittance and d_image; writes d_image and partial sums [groups][12].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -42,8 +43,8 @@ void main() {
             before[c] = map[c] * d.x + map[4u + c] * d.y + map[8u + c] * d.z;
             d_image[c * args.pixels + p] = before[c];
         }
-        // More of the splats is more of the offset and less of the background as it is; the gradient before the map
-        // has the background as if it were mapped.
+        // A larger share of the splats means more of the offset and less of the unmapped background; the gradient
+        // before the map treats the background as if it were mapped.
         const vec3 offset = vec3(map[3], map[7], map[11]);
         d_image[3u * args.pixels + p] = dot(before - d, background()) + dot(d, offset);
     }

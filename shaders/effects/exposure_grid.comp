@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// As exposure.comp, by a bilateral grid of maps in place of one: tones that a camera changed from place to place. Place:
-// between blend and loss, in training alone.
-// Work: one thread a pixel. Shared memory: none. Reads picture, transmittance and maps; writes the mapped picture.
+// Does what exposure.comp does with a bilateral grid of maps in place of one map, for cameras whose tones change from
+// place to place.
+// Place: between blend and loss, only in training.
+// Work: one thread per pixel. Shared memory: none. Reads picture, transmittance and maps; writes the mapped picture.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Where a pixel lies in a photo's bilateral grid of colour maps, and the map there: trilinear between the vertices,
-// across the picture, down, and by the luminance of what the splats show. Source: Bilateral Guided Radiance Field
-// Processing, arXiv 2406.00448. The includer declares args and maps.
+// Finds where a pixel lies in a photo's bilateral grid of colour maps, and the map there: trilinear between the
+// vertices, which lie across the picture, down, and along the luminance of what the splats show. Source: Bilateral
+// Guided Radiance Field Processing, arXiv 2406.00448. The includer declares args and maps.
 
 const vec3 LUMINANCE = vec3(0.299, 0.587, 0.114);
 
-// In units of vertices.
+// The place in units of vertices.
 vec3 grid_place(uint p, vec3 colour) {
     const uint height = args.pixels / args.width;
     const float luminance = clamp(dot(colour, LUMINANCE), 0.0, 1.0);
@@ -14,13 +14,13 @@ vec3 grid_place(uint p, vec3 colour) {
                 luminance * float(EXPOSURE_GRID_L - 1));
 }
 
-// The first of the three rows of a vertex's map, of maps[view][l][y][x][3].
+// The first of the three rows of a vertex's map, in maps[view][l][y][x][3].
 uint grid_rows(uint view, uvec3 vertex) {
     const uint plane = (view * EXPOSURE_GRID_L + vertex.z) * EXPOSURE_GRID_Y + vertex.y;
     return (plane * EXPOSURE_GRID_X + vertex.x) * 3u;
 }
 
-// The rows of the map, and by how much they change from this luminance's vertex to the next.
+// The rows of the map, and how they change from this luminance's vertex to the next.
 struct GridMap { vec4 row[3]; vec4 slope[3]; };
 
 GridMap grid_map_at(vec3 place) {

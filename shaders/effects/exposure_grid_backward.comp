@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The gradient of exposure_grid.comp to the picture: d_image becomes that of the picture before the map, and its last
-// plane dL/d(1 - transmittance), as exposure_backward.comp leaves them. A colour counts for where it lies in the grid,
-// too. Place: between exposure_grid_gradient, which reads d_image as it was, and blend_backward.
-// Work: one thread a pixel. Shared memory: none. Reads the picture before the map, transmittance, maps, d_image; writes
-// d_image.
+// The gradient of exposure_grid.comp with respect to the picture. d_image becomes the gradient of the picture before
+// the map, and its last plane dL/d(1 - transmittance), as exposure_backward.comp leaves them. A colour also decides
+// where it lies in the grid, and that counts, too.
+// Place: between exposure_grid_gradient, which reads the unchanged d_image, and blend_backward.
+// Work: one thread per pixel. Shared memory: none. Reads the picture before the map, transmittance, maps and d_image;
+// writes d_image.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -30,7 +31,7 @@ void main() {
     const vec4 colour = covered_colour(p);
     const vec3 d = vec3(d_image[p], d_image[args.pixels + p], d_image[2u * args.pixels + p]);
     const GridMap map = grid_map_at(grid_place(p, colour.rgb));
-    // dL/d(level), the place along luminance.
+    // dL/d(level), where level is the place along the luminance.
     const float d_level = dot(d.x * map.slope[0] + d.y * map.slope[1] + d.z * map.slope[2], colour);
     const float luminance = dot(colour.rgb, LUMINANCE);
     const bool within = luminance > 0.0 && luminance < 1.0;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The gradient of exposure_grid.comp to a photo's grid of maps, with that of its smoothness. Place: between loss and
-// exposure_grid_backward.
-// Work: a group a vertex of the picture's plane, for all luminances: it walks over the pixels around, which are its
-// own alone, so that the sum is the same in every run. Shared memory: 48 floats a thread, which a thread a term
-// adds up. Reads the picture before the map, transmittance, maps, d_image; writes the gradient [vertices][12].
+// The gradient of exposure_grid.comp with respect to a photo's grid of maps, including that of its smoothness.
+// Place: between loss and exposure_grid_backward.
+// Work: one group per vertex of the picture's plane, for all luminances. It walks over the pixels around the vertex and
+// owns its sums, so that they are the same in every run. Shared memory: 48 floats per thread, added up by one thread
+// per term. Reads the picture before the map, transmittance, maps and d_image; writes the gradient [vertices][12].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -24,7 +24,7 @@ layout(set = 0, binding = 4, scalar) readonly buffer FinalT { float final_transm
 
 shared vec4 sums[EXPOSURE_GRID_THREADS][3 * EXPOSURE_GRID_L];  // rows of the maps
 
-// The gradient of half the squared differences from the neighbours, weighted.
+// The weighted gradient of half the squared differences from the neighbours.
 float roughness(uvec3 at, uint term) {
     const uvec3 last = uvec3(EXPOSURE_GRID_X - 1, EXPOSURE_GRID_Y - 1, EXPOSURE_GRID_L - 1);
     const uint row = term / 4u, column = term % 4u;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Lens distortion in the projection: the models of engine/data/lens_model.h on the plane z = 1, their Jacobian and the
-// gradient through it. A lens is a front, u a(|u|^2) with a = atan(c r) / (w r) (fisheye, FOV; none where w = 0),
-// followed by w g(|w|^2) + tangential + thin prism with g a quotient of polynomials. Matrices: m[column][row].
+// gradient through it. A lens begins with a front, u a(|u|^2) with a = atan(c r) / (w r) (fisheye, FOV; none where w =
+// 0). It is followed by w g(|w|^2) + tangential + thin prism, where g is a quotient of polynomials. Matrices:
+// m[column][row].
 
 // a, a' and a'' of the front as functions of the squared radius.
 vec3 lens_front(CameraData camera, float square) {
@@ -40,7 +41,7 @@ vec3 lens_radial(CameraData camera, float s) {
 
 mat2 radial_jacobian(vec2 v, vec3 g) { return mat2(g.x) + 2.0 * g.y * outerProduct(v, v); }
 
-// sum over i, j of C[j][i] d^2(v_i g) / (dv_j dv_k), for each k.
+// The sum over i, j of C[j][i] d^2(v_i g) / (dv_j dv_k), for each k.
 vec2 radial_second(vec2 v, vec3 g, mat2 C) {
     const vec2 along = C * v;
     return 2.0 * g.y * ((C[0][0] + C[1][1]) * v + along + v * C) + 4.0 * g.z * dot(v, along) * v;
@@ -68,7 +69,7 @@ LensPoint lens_point(CameraData camera, vec2 ray) {
     return at;
 }
 
-// Beyond the fold the distortion is no longer one to one: such rays reach no pixel.
+// Beyond the fold the distortion is no longer one to one, and such rays reach no pixel.
 bool lens_sees(CameraData camera, LensPoint at) { return dot(at.w, at.w) <= camera.lens_fold * camera.lens_fold; }
 
 mat2 lens_jacobian(LensPoint at) { return at.plane_jacobian * at.front_jacobian; }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The deviation of each splat's 3D smoothing filter: sqrt(0.2) of the smallest pixel footprint, depth over focal
-// length, among the cameras that see its centre; 0 where none does. Place: in training, every 100 iterations.
-// Source: Mip-Splatting (Yu et al. 2024), section 5.1; like theirs a frame counts with 15 % around it.
-// Work: one thread a splat. Shared memory: none. Reads cameras and positions; writes the filters.
+// length, among the cameras that see its centre; 0 where none does.
+// Place: in training, every 100 iterations. Source: Mip-Splatting (Yu et al. 2024), section 5.1; as in theirs, a frame
+// counts with 15 % around it.
+// Work: one thread per splat. Shared memory: none. Reads cameras and positions; writes the filters.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Blends each tile's splats front to back. alpha = min(0.99, opacity * w(q)); below the cut-off nothing; a pixel
-// ends before the splat that would bring its transmittance below 1e-4, less the slack of limits.h. Place: last
-// pass of the forward walk.
-// Source: 3DGS section 4; kernels of DARB-Splatting.
-// Work: one workgroup a tile, one subgroup an area of it, PIXELS pixels a thread in registers. Each lane loads one
-// intersection of the tile's list; those whose ellipse touches the area are broadcast in turn. Shared memory: a
-// subgroup's own lists; no barrier. Reads intersections and projected splats; writes the image and, for the backward
-// pass, the final transmittance and where each pixel ended, with CHECKPOINTS also those of lib/bucket.glsl. Lists too
-// long for one dispatch are worked off SEGMENT intersections at a time; between the dispatches the outputs hold the
-// pixels' state.
+// Blends each tile's splats front to back. alpha = min(0.99, opacity * w(q)), and nothing below the cut-off. A pixel
+// ends before the splat that would bring its transmittance below 1e-4, less the slack of limits.h.
+// Place: last pass of the forward walk. Source: 3DGS section 4; kernels of DARB-Splatting.
+// Work: one workgroup per tile and one subgroup per area of it, with PIXELS pixels per thread in registers. Each lane
+// loads one intersection of the tile's list, and those whose ellipse touches the area are broadcast in turn. Shared
+// memory: a subgroup's own lists; no barrier. Reads intersections and projected splats; writes the image and, for the
+// backward pass, the final transmittance and where each pixel ended, with CHECKPOINTS also the records of
+// lib/bucket.glsl. Lists that are too long for one dispatch are processed SEGMENT intersections at a time; between the
+// dispatches the outputs hold the pixels' state.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -18,7 +17,7 @@
 #include "forward/blend_interface.glsl"
 #include "forward/blend_pixels.glsl"
 
-// One splat on all pixels of the thread. d: mean - centre of the thread's first pixel.
+// Blends one splat into all pixels of the thread. d: mean - centre of the thread's first pixel.
 void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, float exponent, uint number,
                  vec3 depth) {
     for (uint k = 0u; k < PIXELS; ++k) {
@@ -36,11 +35,11 @@ void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, flo
     }
 }
 
-// All collected splats in order, at least one; false when every pixel has ended.
+// Blends all collected splats, at least one, in order; returns false when every pixel has ended.
 bool blend_hits(inout Pixels px, vec2 centre, uint count) {
     float alive = 1.0;
     uint batch = 0u;
-    do {  // ends at its bottom, as the one within: see emit_cells
+    do {  // tested at the bottom, as is the inner loop: see emit_cells
         const uint mine = batch + gl_SubgroupInvocationID;
         vec4 shape = vec4(0.0), light = vec4(0.0);
         vec3 depth = vec3(0.0);
@@ -75,7 +74,7 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
 
 #include "forward/blend_state.glsl"
 
-// Closes a bucket.
+// Writes the checkpoint at the end of a bucket.
 void store_checkpoint(Pixels px, uint record) {
     for (uint k = 0u; k < PIXELS; ++k) {
         const uint slot = gl_SubgroupID * AREA_PIXELS + k * SUBGROUP_SIZE + gl_SubgroupInvocationID;

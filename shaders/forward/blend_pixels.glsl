@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The pixels of a thread in the forward blends, and one sample on one of them. Needs forward/blend_interface.glsl.
+// The pixels of a thread in the forward blends, and how one sample is blended into one of them. Needs
+// forward/blend_interface.glsl.
 
 struct Pixels {
     float transmittance[PIXELS];  // negative once the pixel has ended
     vec3 colour[PIXELS];
-    uint last[PIXELS];  // 1 + the last intersection looked at while it was alive; 0: none
+    uint last[PIXELS];  // 1 + the last intersection that was looked at before the pixel ended; 0: none
 };
 
-// Light of the current bucket; not in Pixels, so that nothing of it is left without checkpoints. So are depths.
+// The light of the current bucket. It is not a part of Pixels, so that nothing of it remains without checkpoints. The
+// same holds for depths.
 const uint BUCKET_COLOURS = CHECKPOINTS == 1 ? PIXELS : 1u;
 vec3 bucket_colour[BUCKET_COLOURS];
 const uint DEPTHS = DEPTH_SUM == 1 ? PIXELS : 1u, BUCKET_DEPTHS = CHECKPOINTS == 1 ? DEPTHS : 1u;
@@ -22,7 +24,7 @@ void blend_sample(inout Pixels px, uint k, float alpha, vec3 colour, float depth
     const float before = px.transmittance[k];
     const float wanted = alpha * before;
     const float next = before - wanted;
-    const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for what has ended
+    const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for a pixel that has ended
     px.colour[k] += (goes_on ? wanted : 0.0) * colour;
     if (CHECKPOINTS == 1) bucket_colour[k] += (goes_on ? wanted : 0.0) * colour;
     if (DEPTH_SUM == 1) depth_sum[k] += (goes_on ? wanted : 0.0) * depth;

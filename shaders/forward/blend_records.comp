@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The form `records` of blend.comp, for devices where an instruction more or less counts: splats from shared memory
-// (lib/records.glsl), and no test of ends before the first pixel of the block ends. Place: last pass of the forward walk.
-// Work: one workgroup a tile, one subgroup a block of it. A batch of as many splats as there are lanes is blended without
-// looking for ends. As transmittance only falls, no pixel ended in it if all are at or above the stop afterwards; else the
-// block goes on from before the batch with blend.comp's tests, to the end of its list. The same decisions either way.
-// Shared memory: a subgroup's own lists and records; no barrier. Reads and writes what blend.comp does; leaves no
-// checkpoints and does not resort by DEPTH_ORDER_PIXEL.
+// The form `records` of blend.comp, for devices where every instruction counts: splats come from shared memory
+// (lib/records.glsl), and ends are not tested before the first pixel of the block ends.
+// Place: last pass of the forward walk.
+// Work: one workgroup per tile, one subgroup per block of it. A batch of as many splats as there are lanes is blended
+// without looking for ends. As transmittance only falls, no pixel ended in the batch if all are at or above the stop
+// afterwards. Otherwise the block goes back to before the batch and continues with blend.comp's tests to the end of its
+// list. Both ways decide the same. Shared memory: a subgroup's own lists and records; no barrier. Reads and writes what
+// blend.comp does, but leaves no checkpoints and does not resort by DEPTH_ORDER_PIXEL.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -24,7 +25,8 @@ float alpha_of(Record r, vec2 offset) {
     return mix(0.0, raw, raw >= ALPHA_CUTOFF);
 }
 
-// A batch of `count` records, none of whose pixels had ended before; false, and px as it was, where one ends in it.
+// Blends a batch of `count` records, before which no pixel had ended. Returns false and leaves px unchanged where one
+// ends in it.
 bool blend_without_ends(inout Pixels px, uint count, vec2 offset) {
     float transmittance[PIXELS], depths[DEPTHS];
     vec3 colour[PIXELS];
@@ -36,7 +38,7 @@ bool blend_without_ends(inout Pixels px, uint count, vec2 offset) {
     uint at = records_base(), turn = 0u, number = 0u;
     do {
         const Record r = load_record(at);
-        [[unroll]] for (uint k = 0u; k < PIXELS; ++k) {  // a loop would count on lavapipe: LIST_SEGMENT
+        [[unroll]] for (uint k = 0u; k < PIXELS; ++k) {  // no loop, whose rounds lavapipe counts: LIST_SEGMENT
             const float share = alpha_of(r, offset + vec2(slot_offset(k))) * transmittance[k];
             colour[k] += share * r.colour;
             if (DEPTH_SUM == 1) depths[k] += share * r.depth;
@@ -67,14 +69,15 @@ void blend_with_ends(inout Pixels px, uint count, vec2 offset) {
     } while (++turn < count);
 }
 
-// All collected splats in order, at least one; false when every pixel has ended. any_ended: a pixel has ended.
+// Blends all collected splats, at least one, in order; returns false when every pixel has ended. any_ended: some pixel
+// has ended.
 bool blend_hits(inout Pixels px, inout bool any_ended, vec2 centre, uint count) {
     const vec2 offset = first_offset();
     float alive = 1.0;
     uint batch = 0u;
-    do {  // ends at its bottom, as those within: see emit_cells
+    do {  // tested at the bottom, as are the inner loops: see emit_cells
         const uint mine = batch + gl_SubgroupInvocationID;
-        order_within_subgroup();  // the records may still be read
+        order_within_subgroup();  // other lanes may still read the records
         if (mine < count)
             store_record(records_base() + gl_SubgroupInvocationID * RECORD,
                          make_record(hit_splat[hits_base() + mine], hit_index[hits_base() + mine] + 1u, centre));
@@ -109,7 +112,7 @@ void main() {
     if (SEGMENT > 0u && args.segment > 0u) load(px, first);
     float least = px.transmittance[0];
     for (uint k = 1u; k < PIXELS; ++k) least = min(least, px.transmittance[k]);
-    bool any_ended = subgroupAny(least < 0.0);  // or lies beside the picture
+    bool any_ended = subgroupAny(least < 0.0);  // or it lies beside the picture
     if (range.x < range.y) {
         uint chunk = range.x;
         bool alive = true;

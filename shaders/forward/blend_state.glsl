@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The pixels of a thread from and to the outputs. Needs forward/blend_pixels.glsl.
+// Loads and stores the pixels of a thread from and to the outputs. Needs forward/blend_pixels.glsl.
 
-// The state that the dispatch before this one left.
+// The state that the previous dispatch left.
 void load(inout Pixels px, uvec2 first) {
     const uint plane = args.width * args.height;
     for (uint k = 0u; k < PIXELS; ++k) {

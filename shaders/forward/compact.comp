@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Gathers the visible splats: their depth as a sortable key and their index, in file order.
-// Place: after the scan of the visible flags. Work: one thread a splat. Shared memory: none.
+// Gathers the visible splats in file order: their depth as a sortable key, and their index.
+// Place: after the scan of the visible flags.
+// Work: one thread per splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

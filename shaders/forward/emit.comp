@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Writes one intersection for each tile that a visible splat touches, in depth order: the tile as sort key and the
-// splat. Place: after the scan of the intersection counts. Work: one thread a visible splat. Shared memory: none.
-// Counts the huge splats; with COOPERATE it lists their ranks instead of writing their intersections.
+// Writes one intersection for each tile that a visible splat touches, in depth order: the tile as sort key, and the
+// splat.
+// Place: after the scan of the intersection counts.
+// Work: one thread per visible splat. Shared memory: none. Counts the huge splats; with COOPERATE it lists their ranks
+// instead of writing their intersections.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -40,15 +42,15 @@ void main() {
     const EllipseRows e = ellipse_rows(shape.xy, shape.z, shape.w, l22, splat_bound[splat].y);
     uint slot = offset_by_depth[rank];
     first_intersection[splat] = slot;
-    // Offsets only grow, unless their sum left 32 bits.
+    // Offsets only grow, unless their sum exceeds 32 bits.
     const uint next = rank + 1u < status.visible ? offset_by_depth[rank + 1u] : status.intersections;
     if (next < slot) {
         atomicOr(status.overflow, OVERFLOW_TOTAL);
         atomicMax(status.intersections, 0xFFFFFFFFu);
     }
-    if (slot >= args.intersection_capacity) return;  // the frame is repeated
+    if (slot >= args.intersection_capacity) return;  // the host repeats the frame
     if (next > slot && next - slot > HUGE_INTERSECTIONS) {
-        // Less than intersection_capacity / HUGE_INTERSECTIONS + 1, unless the sum of the counts left 32 bits.
+        // Less than intersection_capacity / HUGE_INTERSECTIONS + 1, unless the sum of the counts exceeds 32 bits.
         const uint at = atomicAdd(status.huge_splats, 1u);
         if (COOPERATE == 1) {
             if (at <= args.intersection_capacity / HUGE_INTERSECTIONS) huge_rank[at] = rank;

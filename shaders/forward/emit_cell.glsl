@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The intersections of cells of a splat's cover, for emit.comp and emit_huge.comp, which declare args,
+// Writes the intersections for cells of a splat's cover, for emit.comp and emit_huge.comp, which declare args,
 // tile_from_intersection and splat_from_intersection. Needs tile.glsl.
 
 uint touched_blocks(EllipseRows e, uvec2 tile) {
@@ -14,8 +14,8 @@ uint touched_blocks(EllipseRows e, uvec2 tile) {
     return bits << INTERSECTION_BLOCK_SHIFT;
 }
 
-// An intersection for each tile of the cells in `bits`, which are not empty, from `slot` on. One loop that ends at its
-// bottom: lavapipe goes through the body of one that ends at its top once more, behind a mask.
+// Writes an intersection for each tile of the cells in `bits`, which are not empty, from `slot` on. It is one loop that
+// is tested at its bottom: lavapipe runs the body of a loop that is tested at its top once more, behind a mask.
 void emit_cells(TileCover c, uvec2 bits, uint splat, EllipseRows e, uint slot) {
     const uvec2 size = cell_size(c.extent);
     uvec2 tile = uvec2(0), first = uvec2(0), last = uvec2(0);  // tiles of the cell; none yet

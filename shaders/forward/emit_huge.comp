@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The intersections of the splats that emit.comp left over: the same intersections in the same slots, so that the lists
-// are bit-equal. Place: after emit.comp, in frames whose predecessor had huge splats. Work: a workgroup takes every
-// EMIT_HUGE_GROUPS-th huge splat, a thread one of the 64 cells of its cover. Shared memory: none. Reads covers and
-// projected splats; writes intersections.
+// Writes the intersections of the splats that emit.comp left over, into the same slots, so that the lists are
+// bit-equal.
+// Place: after emit.comp, in frames whose predecessor had huge splats.
+// Work: a workgroup takes every EMIT_HUGE_GROUPS-th huge splat, and a thread one of the 64 cells of its cover. Shared
+// memory: none. Reads covers and projected splats; writes intersections.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

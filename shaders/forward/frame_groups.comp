@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Sizes the dispatches over visible splats and over intersections, and notes an overflow of the intersection buffers.
-// One: after the scan of the flags (STAGE 0), one after the scan of the counts (STAGE 1).
+// Place: after the scan of the flags (STAGE 0), and again after the scan of the counts (STAGE 1).
 // Work: one thread. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -18,7 +18,7 @@ layout(push_constant, scalar) uniform Push { IntersectionArgs args; };
 layout(set = 0, binding = 0, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = 1, scalar) buffer Groups { FrameGroups groups; };
 layout(set = 0, binding = 2, scalar) readonly buffer Total { uint total; };  // total of the scan
-layout(set = 0, binding = 3, scalar) writeonly buffer InUse { uint in_use; };  // what later passes handle
+layout(set = 0, binding = 3, scalar) writeonly buffer InUse { uint in_use; };  // the count for later passes
 
 uvec2 split_groups(uint count) {
     const uint n = max((count + uint(SPLAT_GROUP) - 1u) / uint(SPLAT_GROUP), 1u);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The intersection counts in depth order, ready for their scan. Place: after the depth sort.
-// Work: one thread a visible splat. Shared memory: none.
+// Brings the intersection counts into depth order, ready for their scan.
+// Place: after the depth sort.
+// Work: one thread per visible splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

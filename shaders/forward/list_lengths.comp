@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The longest of the tiles' lists, and whether it is longer than the blend dispatches take on.
-// Place: after tile_ranges. Work: one thread a tile. Shared memory: none.
+// Finds the longest of the tiles' lists, and whether it is too long for the blend dispatches.
+// Place: after tile_ranges.
+// Work: one thread per tile. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -21,6 +22,6 @@ void main() {
     const uint tile = linear_id();
     if (tile >= args.tile_count) return;
     const uint intersections = tile_range[tile].y - tile_range[tile].x;
-    if (intersections > status.longest_list) atomicMax(status.longest_list, intersections);  // seldom: most are shorter
+    if (intersections > status.longest_list) atomicMax(status.longest_list, intersections);  // rarely: most are shorter
     if (intersections > args.list_capacity) atomicOr(status.overflow, OVERFLOW_LISTS);
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Projects every splat: camera space, Cholesky factor of the projected covariance, colour from SH, reach and
-// the tiles that it touches. Place: first pass of a frame. Source: docs/math.md, Projection.
-// Work: one thread a splat. Shared memory: none. Reads parameters; writes the projected splat and its cover.
+// Projects every splat: camera space, Cholesky factor of the projected covariance, colour from SH, reach, and the tiles
+// that it touches.
+// Place: first pass of a frame. Source: docs/math.md, Projection.
+// Work: one thread per splat. Shared memory: none. Reads parameters; writes the projected splat and its cover.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -51,7 +52,7 @@ layout(set = 0, binding = FRAME_BINDING + 8, scalar) writeonly buffer SplatExpon
 
 #include "lib/rest.glsl"
 
-// Not clamped: max may drop NaN.
+// Not clamped, because max may drop NaN.
 vec3 splat_colour(uint i, vec3 direction) {
     vec3 colour = first_band(sh_dc[i]);
     if (SH_DEGREE > 0) {
@@ -67,8 +68,9 @@ vec3 splat_colour(uint i, vec3 direction) {
     return colour;
 }
 
-// Given the image position, a splat's depth has the mean z - slope . (x, y), (x, y) the whitened offset of blend.comp:
-// slope = L c, c the covariance of depth and image position; r3: the row of M for the depth. As two halves.
+// At a given image position, a splat's depth has the mean z - slope . (x, y), where (x, y) is the whitened offset of
+// blend.comp, slope = L c, and c the covariance of depth and image position. r3: the row of M for the depth. Returned
+// as two halves.
 float depth_slope(Factor f, vec3 r1, vec3 r2, vec3 r3) {
     const vec2 c = vec2(dot(r3, r1), dot(r3, r2));
     const float x = f.l11 * c.x + f.l21 * c.y, y = f.l22 * c.y;
@@ -87,7 +89,7 @@ void store_splat(uint i, vec2 mean, Factor f, vec3 colour, float opacity) {
     }
 }
 
-// The number of tiles; the cover is empty when the ellipse misses the image.
+// Returns the number of tiles; the cover is empty where the ellipse misses the image.
 uint find_cover(CameraData camera, vec2 mean, Factor f, float reach, out TileCover c) {
     const vec2 half_extent = sqrt(reach * vec2(f.a, f.c)) * 1.001 + 0.01;
     const vec2 tiles = vec2(camera.tiles_x, camera.tiles_y);
@@ -100,10 +102,10 @@ uint find_cover(CameraData camera, vec2 mean, Factor f, float reach, out TileCov
     const vec2 last = min(vec2((c.origin + c.extent) * TILE_SIZE), vec2(camera.width, camera.height)) - 0.5;
     const EllipseRows e = ellipse_rows(mean, f.l11, f.l21, f.l22, reach);
     uint count = 0u, y = 0u;
-    do {  // ends at its bottom: see emit_cells
+    do {  // tested at the bottom: see emit_cells
         const float low_y = corner.y + float(y) * cell.y;
         const vec2 x = columns_between(e, low_y, min(low_y + cell.y - 1.0, last.y));
-        // Between the last pixel of a cell and the first of the next there is no centre.
+        // No pixel centre lies between the last pixel of a cell and the first of the next.
         const vec2 k = (x - corner.x + vec2(1.0, 0.0)) / cell.x;
         const uint from = uint(clamp(ceil(k.x) - 1.0, 0.0, float(cells.x - 1u)));
         const uint to = uint(clamp(floor(k.y), 0.0, float(cells.x - 1u)));
@@ -117,7 +119,7 @@ uint find_cover(CameraData camera, vec2 mean, Factor f, float reach, out TileCov
     return count;
 }
 
-// 0 intersections and the reason, or the number of intersections.
+// Returns the number of intersections, or 0 and the reason.
 uint project(uint i, out int reason) {
     const CameraData camera = cameras[args.camera_index];
     const vec3 to_splat = from_centre(camera, position[i]);
@@ -182,7 +184,7 @@ uint project(uint i, out int reason) {
     return count;
 }
 
-// One addition to memory a subgroup and reason.
+// One addition to memory per subgroup and reason.
 void count_culled(bool culled, int reason) {
     for (int r = 0; r <= CULL_COLOUR; ++r) {
         const uint n = subgroupBallotBitCount(subgroupBallot(culled && reason == r));

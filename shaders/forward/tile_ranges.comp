@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Finds where each tile's run of intersections begins and ends in the sorted intersections; tiles without intersections
-// keep (0, 0). Place: after the tile sort. Work: one thread an intersection. Shared memory: none.
+// Finds where each tile's run begins and ends in the sorted intersections; tiles without intersections keep (0, 0).
+// Place: after the tile sort.
+// Work: one thread per intersection. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// An image of half the size, brought to full size by linear interpolation: the accuracy setting "resolution 1/2".
-// Pixel centres at +0.5 in both; outside the outermost centres the nearest one. Place: after blend.
-// Work: one thread a pixel of the result. Shared memory: none.
+// Brings an image of half the size to full size by linear interpolation: the accuracy setting "resolution 1/2". Pixel
+// centres are at +0.5 in both; outside the outermost centres the nearest one counts.
+// Place: after blend.
+// Work: one thread per pixel of the result. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

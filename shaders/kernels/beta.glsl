@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // w = u^e = 2^(e log2 u), u = 1 - q/R^2: the kernel `beta`, whose exponent e each splat has of its own
-// (engine/kernels/shaped_kernel.cpp). log2 by additions, multiplications and one division, so that a centre has
-// log2 = 0 and a device the accuracy of float32, where Vulkan's log2 may be off by 2^-21.
+// (engine/kernels/shaped_kernel.cpp). log2 is made of additions, multiplications and one division, so that it is 0 at a
+// centre and a device has the accuracy of float32. Vulkan's log2 may be off by 2^-21.
 
 // log2((1 + s)/(1 - s)).
 float log2_series(float s) {
@@ -18,7 +18,7 @@ float log2_of_rest(float t) {
     return float(k) + log2_series(mix(m - 1.0, -t, k == 0) / (m + 1.0));
 }
 
-// 2^y, y <= 0: as the Gaussian's.
+// 2^y for y <= 0, computed as the Gaussian's.
 float power_of_two(float y) {
     const float above = max(y, -126.0), n = roundEven(above);
     float p, dp;
@@ -26,7 +26,7 @@ float power_of_two(float y) {
     return intBitsToFloat(floatBitsToInt(p) + (int(n) << 23));
 }
 
-// Also dw/de = w ln u.
+// Also gives dw/de = w ln u.
 void beta_value_slope(float q, float exponent, out float w, out float slope, out float by_exponent) {
     const float t = min(q * KERNEL_INVERSE_SUPPORT, 1.0), u = 1.0 - t;
     const bool inside = u > 0.0;
@@ -39,7 +39,7 @@ void beta_value_slope(float q, float exponent, out float w, out float slope, out
     by_exponent = mix(0.0, 0.69314718 * w * log_u, inside);
 }
 
-// The exponent of a splat's shape, and its derivative, 0 where it is held.
+// The exponent of a splat's shape and its derivative, which is 0 where the exponent is held at a bound.
 float beta_exponent(float shape, out float by_shape) {
     by_shape = BETA_START * exp(min(shape, 80.0));
     const float free = by_shape + (FOOTPRINT == FOOTPRINT_EXACT ? 0.5 : 0.0);
@@ -51,7 +51,7 @@ float beta_reach(float exponent, float least) {
     return KERNEL_SUPPORT * (1.0 - exp2(log2(least) / exponent));
 }
 
-// psi = R^2 / (2 b + 5), and half of d ln psi / de: of the lengths.
+// psi = R^2 / (2 b + 5), and half of d ln psi / de, which is that of lengths.
 float beta_covariance_scale(float exponent) {
     return FOOTPRINT == FOOTPRINT_PSI ? KERNEL_SUPPORT / (2.0 * exponent + 5.0) : 1.0;
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The kernels by the formulas of the paper, with sqrt, division and the built-in exp, sin and cos, corrected near
-// d = 0. For comparison of cost and accuracy; Vulkan leaves sin and cos 2^-11 of error. Only kernels that have
-// such a formula: others, and the exact footprints of the compact ones, keep their polynomial. KERNEL_SUPPORT ends
-// the pulses; there is no polynomial for more than one, so these take sin and cos of kernels/sine.glsl.
+// The kernels by the formulas of the paper, with sqrt, division and the built-in exp, sin and cos, corrected near d =
+// 0. They serve to compare cost and accuracy; Vulkan leaves sin and cos an error of 2^-11. Only some kernels have such
+// a formula: others, and the exact footprints of the compact ones, keep their polynomial. KERNEL_SUPPORT ends the
+// pulses. There is no polynomial for more than one pulse, so those take sin and cos of kernels/sine.glsl.
 #include "kernels/sine.glsl"
 
 float kernel_sin(float x) {
@@ -23,14 +23,14 @@ bool builtin_exists() {
 
 const float PI = 3.14159265;
 
-// sin(x)/x. Below x = 1/2 its series, to 1.1e-8: sin(x) may be absolutely wrong, or 0 for small angles, and 0/0 is
-// the centre.
+// sin(x)/x. Below x = 1/2 it is a series, good to 1.1e-8: there sin(x) may be off absolutely, or 0 for small angles,
+// and 0/0 occurs at the centre.
 float sinc(float x) {
     const float s = x * x;
     return s < 0.25 ? 1.0 - s * (1.0 / 6.0 - s * (1.0 / 120.0 - s * (1.0 / 5040.0))) : kernel_sin(x) / x;
 }
 
-// sinc and its derivative by x^2, whose closed form cancels near 0.
+// sinc and its derivative by x^2. The derivative's closed form cancels near 0.
 void sinc_slope(float x, out float w, out float slope) {
     const float s = x * x;
     w = sinc(x);
@@ -57,7 +57,7 @@ void builtin_value_slope(float q, out float w, out float slope) {
         const float k = PI / 3.0;
         sinc_slope(k * d, w, slope);
         slope *= k * k;
-        if (KERNEL_PULSES > 1 && w < 0.0) {  // |sinc|: the alpha of a negative ring would be below any cut-off
+        if (KERNEL_PULSES > 1 && w < 0.0) {  // the alpha of a negative ring would be below any cut-off
             w = -w;
             slope = -slope;
         }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// w = exp(-((q + s)^(t/2) - s^(t/2)) / 2): the kernel `generalized_exponential`, whose exponent t each splat has of
-// its own (engine/kernels/shaped_kernel.cpp). s bounds the slope at the centre, and w is 1 there: both powers
-// come out of the same steps; that of s is one of the splat. One logarithm and two powers of two a pixel: multiplications
-// and additions alone, in pairs, as what follows waits for them; a division costs as much as ten of them.
+// w = exp(-((q + s)^(t/2) - s^(t/2)) / 2): the kernel `generalized_exponential`, whose exponent t each splat has of its
+// own (engine/kernels/shaped_kernel.cpp). s bounds the slope at the centre. w is 1 there, because both powers come out
+// of the same steps; that of s is a constant of the splat. A pixel takes one logarithm and two powers of two, made of
+// multiplications and additions alone and in pairs, as each waits for the one before; a division costs as much as ten
+// of them.
 
 // log2 x, x > 0, to 6e-7, to 1.2e-7 between 1/2 and 2: x = 2^k m, m from the root of 1/2 to that of 2, and a
 // polynomial in m - 1 that is 0 at m = 1, off by 5e-8 at most.
@@ -14,7 +15,7 @@ float log2_steady(float x) {
     return y * (low + y4 * high) + float(k);
 }
 
-// 2^y, y between -126 and 127, by the Gaussian's polynomial.
+// 2^y for y between -126 and 127, by the Gaussian's polynomial.
 float power_in_pairs(float y) {
     const float n = roundEven(y), f = y - n, f2 = f * f;
     float p = KERNEL_C0 + KERNEL_C1 * f + f2 * (KERNEL_C2 + KERNEL_C3 * f + f2 * (KERNEL_C4 + KERNEL_C5 * f)), dp;
@@ -30,11 +31,11 @@ float exponential_exp2(float y) {
     return EVALUATION == EVALUATION_BUILTIN ? exp2(y) : power_in_pairs(y);
 }
 
-// Also dw/dt.
+// Also gives dw/dt.
 void exponential_value_slope(float q, float t, out float w, out float slope, out float by_exponent) {
     const float half_t = 0.5 * t;
     const float v = q + EXPONENTIAL_SOFTENING, l = exponential_log2(v);
-    const float p = exponential_exp2(min(half_t * l, 7.0));  // where it is held w is below 2^-92
+    const float p = exponential_exp2(min(half_t * l, 7.0));  // where it is held at 7, w is below 2^-92
     const float first = exponential_exp2(half_t * EXPONENTIAL_SOFTENING_LOG2);
     w = exponential_exp2((p - first) * -0.72134752);  // log2(e)/2
     const float pw = p * w;

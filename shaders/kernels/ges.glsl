@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// w = exp(-q/2), whose lengths are those of the splat times f(t): the kernel `ges_published`, GES as its program draws
-// it. t is a parameter of each splat (engine/kernels/shaped_kernel.cpp); nothing but psi = f^2 knows it.
+// w = exp(-q/2), with lengths that are those of the splat times f(t): the kernel `ges_published`, which is GES as its
+// program draws it. t is a parameter of each splat (engine/kernels/shaped_kernel.cpp) and enters only through psi =
+// f^2.
 void ges_value_slope(float q, out float w, out float slope) {
     gaussian_value_slope(first_kernel(), q, w, slope);
     if (EVALUATION != EVALUATION_BUILTIN) return;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The kernel contract of all shaders: w and dw/dq as functions of q = d^2, and how far they reach. Which
-// kernel runs is a set of specialization constants (engine/raster/kernel_constants.h sets them), so that after
-// constant folding one kernel's arithmetic is left. The constants alone, unset, are the Gaussian by exp().
-// Accuracy: multiplications and additions only where Vulkan promises correct rounding; see KernelCoefficients.
-// The including shader enables GL_GOOGLE_include_directive.
+// The kernel contract of all shaders: w and dw/dq as functions of q = d^2, and how far they reach. A set of
+// specialization constants selects the kernel (engine/raster/kernel_constants.h sets them), so that constant folding
+// leaves the arithmetic of one kernel. With the constants unset, it is the Gaussian by exp(). Accuracy: only
+// multiplications and additions where Vulkan promises correct rounding; see KernelCoefficients. The including shader
+// enables GL_GOOGLE_include_directive.
 #ifndef DARB_KERNEL_GLSL
 #define DARB_KERNEL_GLSL
 
@@ -23,7 +23,7 @@ layout(constant_id = 108) const float KERNEL_INVERSE_SUPPORT = 0.0;  // rounded 
 layout(constant_id = 109) const float COVARIANCE_SCALE = 1.0;        // psi, or 1
 layout(constant_id = 110) const float ALPHA_CUTOFF = ALPHA_CUTOFF_DEFAULT;
 layout(constant_id = 111) const float KERNEL_REACH_MARGIN = 1e-5;  // relative margin of w in kernel_reach
-layout(constant_id = 112) const int KERNEL_PULSES = 1;  // more: form RINGS, built-in only
+layout(constant_id = 112) const int KERNEL_PULSES = 1;  // more than 1: form RINGS, built-in only
 layout(constant_id = 120) const float KERNEL_C0 = 1.0;  // coefficients of P, rising powers; for RINGS: see its form
 layout(constant_id = 121) const float KERNEL_C1 = 0.0;
 layout(constant_id = 122) const float KERNEL_C2 = 0.0;
@@ -36,7 +36,7 @@ layout(constant_id = 128) const float KERNEL_C8 = 0.0;
 
 #include "kernels/parameters.glsl"
 
-// The kernel; of a blend of two the first.
+// The kernel; for a blend of two, the first one.
 KernelParameters first_kernel() {
     return KernelParameters(
         KERNEL_FORM, KERNEL_DEGREE, KERNEL_HALF_POWER, KERNEL_SQUARED_VARIABLE, KERNEL_SUPPORT, KERNEL_INVERSE_SUPPORT,
@@ -50,7 +50,7 @@ KernelParameters first_kernel() {
 #include "kernels/gaussian.glsl"
 #include "kernels/quadric.glsl"
 
-// For the forms without a shape per splat.
+// For the forms without a shape for each splat.
 void form_value_slope(const KernelParameters k, float q, out float w, out float slope) {
     if (k.form == KERNEL_FORM_COMPACT)
         compact_value_slope(k, q, w, slope);
@@ -62,8 +62,8 @@ void form_value_slope(const KernelParameters k, float q, out float w, out float 
 
 #include "kernels/shaped.glsl"
 
-// For a fixed kernel, or a blend of two. A function of its own, so that a shader has few copies of all kernels: drivers
-// inline each call, and some fold the constants only afterwards.
+// For a fixed kernel, or a blend of two. This is a separate function so that a shader has few copies of all kernels:
+// drivers inline each call, and some fold the constants only afterwards.
 void fixed_value_slope(float q, float exponent, out float w, out float slope, inout float by_exponent) {
     if (EVALUATION == EVALUATION_BUILTIN && BLENDED == 0 && builtin_exists())
         builtin_value_slope(q, w, slope);
@@ -72,8 +72,9 @@ void fixed_value_slope(float q, float exponent, out float w, out float slope, in
     if (BLENDED == 1) blend_value_slope(q, exponent, w, slope, by_exponent);
 }
 
-// w and its derivative by q, for q >= 0; both 0 at and after the support's edge, w never negative. The slope is
-// the derivative of the w computed here. exponent: the splat's, of a kernel with shapes; by_exponent: dw by it.
+// w and its derivative by q, for q >= 0. Both are 0 at and beyond the support's edge, and w is never negative. The
+// slope is the derivative of the w computed here. exponent: the splat's, for a kernel with shapes; by_exponent:
+// dw/d(exponent).
 void kernel_value_slope(float q, float exponent, out float w, out float slope, out float by_exponent) {
     by_exponent = 0.0;
     if (SHAPED && BLENDED == 0)
@@ -88,7 +89,8 @@ float kernel_value(float q, float exponent) {
     return w;
 }
 
-// Where w falls for the last time through `least`, which is at most 1: outside the peak of that pulse. Of RINGS.
+// Where w of RINGS falls through `least`, which is at most 1, for the last time: the range outside the peak of that
+// pulse.
 void last_flank(float least, out float low, out float high) {
     float w, slope;
     low = KERNEL_C0;
@@ -114,9 +116,9 @@ bool has_closed_reach() {
                             (KERNEL_FORM == KERNEL_FORM_QUADRIC && FOOTPRINT == FOOTPRINT_PSI));
 }
 
-// The q beyond which opacity * w < ALPHA_CUTOFF, rounded outwards, at most R^2; 0 below the cut-off. Once per
-// splat: closed forms where there are, else halvings of [0, R^2], or of a pulse's outer flank, on the falling w that
-// is computed.
+// The q beyond which opacity * w < ALPHA_CUTOFF, rounded outwards and at most R^2; 0 below the cut-off. It runs once
+// per splat, with closed forms where there are any. Otherwise it halves [0, R^2], or a pulse's outer flank, on the
+// falling w that is computed.
 float kernel_reach(float opacity, float exponent) {
     if (!(opacity >= ALPHA_CUTOFF)) return 0.0;
     const float least = ALPHA_CUTOFF * (1.0 - KERNEL_REACH_MARGIN) / opacity;
@@ -143,7 +145,7 @@ float kernel_reach(float opacity, float exponent) {
     return min(q * (1.0 + 1e-5), SHAPED ? shaped_support() : KERNEL_SUPPORT);
 }
 
-// What multiplies the projected 2x2 covariance before the low-pass.
+// The factor of the projected 2x2 covariance before the low-pass.
 float kernel_covariance_scale(float exponent) {
     return SHAPED ? shaped_covariance_scale(exponent) : COVARIANCE_SCALE;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Evaluates the kernel contract on an array of q (and of opacities, for the reach): tests and `darb check`
-// compare the result with double. One thread an entry. Reads q, opacity; writes value, slope, reach.
+// Evaluates the kernel contract on an array of q (and of opacities, for the reach); tests and `darb check` compare the
+// result with double. One thread per entry. Reads q and opacity; writes value, slope and reach.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the arithmetic of a form depends on beside q, as engine/kernels derives it for each kernel. Functions of forms
-// take it by value: a kernel and the second of a blend are two values, and what is left of either folds as constants do.
+// What the arithmetic of a form depends on besides q, as engine/kernels derives it for each kernel. The functions of
+// the forms take it by value: a kernel and the second one of a blend are two values, and both fold as constants do.
 struct KernelParameters {
     int form;               // KERNEL_FORM_*
     int degree;             // degree of P

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// P and dP/dx by Horner; folds to `degree` and `degree` - 1 steps.
-// One step; the first one only starts the chain.
+// P and dP/dx by Horner's scheme; it folds to `degree` and `degree` - 1 steps.
+// This is one step; the first one only starts the chain.
 void polynomial_step(int degree, int power, float c, float x, inout float p, inout float dp) {
     if (power == degree) {
         p = c;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What each kernel whose shape each splat has of its own is to the passes; their twin is ShapedKernel
-// (engine/kernels/shaped_kernel.h). One of them is left after constant folding, or none.
+// What each kernel with a shape for each splat provides to the passes; the counterpart is ShapedKernel
+// (engine/kernels/shaped_kernel.h). Constant folding leaves one of them, or none.
 layout(constant_id = 113) const int BLENDED = 0;  // 1: a blend of the kernel with that of BLEND_*
 
 const bool SHAPED = BLENDED == 1 || KERNEL_FORM == KERNEL_FORM_BETA || KERNEL_FORM == KERNEL_FORM_EXPONENTIAL ||
@@ -11,7 +11,7 @@ const bool SHAPED = BLENDED == 1 || KERNEL_FORM == KERNEL_FORM_BETA || KERNEL_FO
 #include "kernels/blend.glsl"
 #include "kernels/ges.glsl"
 
-// For a kernel that is no blend. Also gives dw by the exponent, which is 0 on entry.
+// For a kernel that is not a blend. Also gives dw/d(exponent), which is 0 on entry.
 void shaped_value_slope(float q, float exponent, out float w, out float slope, inout float by_exponent) {
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL)
         exponential_value_slope(q, exponent, w, slope, by_exponent);
@@ -21,7 +21,7 @@ void shaped_value_slope(float q, float exponent, out float w, out float slope, i
         beta_value_slope(q, exponent, w, slope, by_exponent);
 }
 
-// The exponent of a splat's shape, and its derivative, 0 where it is held.
+// The exponent of a splat's shape and its derivative, which is 0 where the exponent is held at a bound.
 float shape_exponent(float shape, out float by_shape) {
     if (BLENDED == 1) return blend_exponent(shape, by_shape);
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_exponent(shape, by_shape);
@@ -29,7 +29,7 @@ float shape_exponent(float shape, out float by_shape) {
     return beta_exponent(shape, by_shape);
 }
 
-// Where w is `least`, below 1, of a kernel that is no blend.
+// The q where w is `least`, below 1, for a kernel that is not a blend.
 float shaped_reach(float exponent, float least) {
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_reach(exponent, least);
     if (KERNEL_FORM == KERNEL_FORM_GES) return -2.0 * log(least);
@@ -43,7 +43,7 @@ float shaped_covariance_scale(float exponent) {
     return beta_covariance_scale(exponent);
 }
 
-// Half of d ln shaped_covariance_scale by the exponent: of the lengths.
+// Half of d ln shaped_covariance_scale / d(exponent), which is that of lengths.
 float shaped_length_slope(float exponent) {
     if (BLENDED == 1) return blend_length_slope(exponent);
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_length_slope(exponent);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// sin and cos from additions and multiplications alone, which Vulkan rounds correctly, for |x| up to a few turns:
-// off by 2e-7 at most, where the built-in ones may be off by 2^-11. x is taken to the nearest multiple of pi, which
-// stands as two floats; polynomials in r^2 are Chebyshev interpolants over [-pi/2, pi/2], off by 2e-10 and less.
+// sin and cos from additions and multiplications alone, which Vulkan rounds correctly, for |x| up to a few turns. They
+// are off by 2e-7 at most, where the built-in ones may be off by 2^-11. The nearest multiple of pi, kept as two floats,
+// is taken from x; the polynomials in r^2 are Chebyshev interpolants over [-pi/2, pi/2], off by 2e-10 at most.
 #ifndef DARB_SINE_GLSL
 #define DARB_SINE_GLSL
 
-// Also (-1)^n, n the multiple.
+// Also gives (-1)^n, where n is the multiple.
 float nearest_half_turn(float x, out float sign_of_it) {
     const float n = round(x * 0.31830988618);
     sign_of_it = 1.0 - 2.0 * abs(n - 2.0 * round(0.5 * n));

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Checkpoints of the forward blend for a backward blend that works off buckets of a tile's list side by side: a
-// record of four planes of the tile's pixels for each bucket. The forward pass leaves the light that the bucket's
-// splats add to the pixel, three planes, and the transmittance behind them; bucket_behind.comp puts what is behind
-// the bucket, dotted with dL/dcolour, into a plane of its own, so that a frame can be walked back more than once.
+// Checkpoints of the forward blend, for a backward blend that works on the buckets of a tile's list side by side. Each
+// bucket has a record of four planes of the tile's pixels. The forward pass leaves the light that the bucket's splats
+// add to the pixel (three planes) and the transmittance behind them. bucket_behind.comp puts what lies behind the
+// bucket, dotted with dL/dcolour, into a plane of its own, so that a frame can be walked back more than once.
 #include "lib/depth_sum.glsl"
 #include "lib/pixel_slot.glsl"
 
 layout(constant_id = 7) const uint BUCKET = BUCKET_INTERSECTIONS;  // a multiple of SUBGROUP_SIZE; divides SEGMENT
 
-// With DEPTH_SUM one plane more, the bucket's share of weight times depth.
+// With DEPTH_SUM there is one more plane, the bucket's share of weight times depth.
 const uint TRANSMITTANCE_PLANE = 3u, BUCKET_DEPTH_PLANE = 4u;
 const uint CHECKPOINT_PLANES = DEPTH_SUM == 1 ? 5u : 4u;
 
-// Records of all tiles are apart, and at most intersections / BUCKET + tiles. list_begin: of the tile's whole list.
+// The records of all tiles are separate, and there are at most intersections / BUCKET + tiles. list_begin: where the
+// tile's whole list begins.
 uint bucket_record(uint tile, uint list_begin, uint bucket) {
     return list_begin / BUCKET + tile + bucket;
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// From a splat's parameters and a camera to the projected Cholesky factor, with its derivatives' ingredients.
-// M = sqrt(scale) J W R diag(s), S' = M M^T + low_pass I, q = (l11 dx + l21 dy)^2 + (l22 dy)^2 (docs/math.md).
+// Takes a splat's parameters and a camera to the projected Cholesky factor, and to what its derivatives need. M =
+// sqrt(scale) J W R diag(s), S' = M M^T + low_pass I, q = (l11 dx + l21 dy)^2 + (l22 dy)^2 (docs/math.md).
 #include "lib/finite.glsl"
 
-// Rotation matrix of a unit quaternion (w, x, y, z); column k is the splat's axis k in the world.
+// The rotation matrix of a unit quaternion (w, x, y, z); column k is the splat's axis k in the world.
 mat3 rotation_matrix(vec4 q) {
     const float w = q.x, x = q.y, y = q.z, z = q.w;
     return mat3(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
@@ -11,8 +11,8 @@ mat3 rotation_matrix(vec4 q) {
                 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
 }
 
-// q / |q| without overflow or underflow for any norm that is not rejected.
-// Returns false for a quaternion of no direction or not finite.
+// q / |q| without overflow or underflow for any norm that is not rejected. Returns false for a quaternion without a
+// direction or that is not finite.
 bool normalise_rotation(vec4 q, out vec4 unit, out float norm) {
     const vec4 a = abs(q);
     const float largest = max(max(a.x, a.y), max(a.z, a.w));
@@ -26,7 +26,8 @@ bool normalise_rotation(vec4 q, out vec4 unit, out float norm) {
 vec3 to_camera(CameraData camera, vec3 v) {
     return vec3(dot(camera.row0, v), dot(camera.row1, v), dot(camera.row2, v));
 }
-// From the camera's centre to p, both world. Rotated after the difference, it is as exact as p far from the world's 0.
+// The vector from the camera's centre to p, both in the world. The difference is taken before the rotation, so that it
+// is exact even where p is far from the world's origin.
 vec3 from_centre(CameraData camera, vec3 p) {
     return (p - camera.centre) - camera.centre_rest;
 }
@@ -43,7 +44,7 @@ struct Factor {
     float determinant;  // determinant of S', times shrink^4
 };
 
-// 2^-k, 2^k the leading bit of the longest entry, where that is beyond ROW_LIMIT.
+// 2^-k where 2^k is the leading bit of the longest entry, if that is beyond ROW_LIMIT; otherwise 1.
 float row_shrink(vec3 r1, vec3 r2) {
     const vec3 most = max(abs(r1), abs(r2));
     const float longest = max(most.x, max(most.y, most.z));
@@ -57,7 +58,7 @@ float inverse_of_power(float power) {  // exact for powers of two
 }
 
 // The factor as it is stored in half precision, and the diagonal of the covariance that belongs to it. Splats wider
-// than 16,000 px end there.
+// than 16,000 px are cut there.
 void round_factor(inout Factor f) {
     f.l11 = max(round_half(f.l11), HALF_LEAST);
     f.l21 = round_half(f.l21);
@@ -66,8 +67,8 @@ void round_factor(inout Factor f) {
     f.a = (f.l21 * f.l21 + f.l22 * f.l22) * f.c / (f.l11 * f.l11);
 }
 
-// r1, r2: rows of M. The determinant in product form has no cancellation. Its fourth powers leave float32 for splats
-// beyond 1e9 px, so that long rows are factored shrunk, which is exact.
+// r1, r2: rows of M. The determinant in product form has no cancellation. Its fourth powers exceed float32 for splats
+// beyond 1e9 px, so long rows are factored after shrinking, which is exact.
 Factor cholesky_factor(vec3 r1, vec3 r2, float low_pass) {
     Factor f;
     f.shrink = row_shrink(r1, r2);

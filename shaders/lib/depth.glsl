@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The depth order of the splats: which one, and the keys that the splats are sorted by.
+// The depth order of the splats, and the keys by which they are sorted.
 #ifndef DARB_DEPTH_GLSL
 #define DARB_DEPTH_GLSL
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rounding to half precision, the same wherever a value is stored as a half: packHalf2x16 may truncate, so the
+// Rounds to half precision in the same way wherever a value is stored as a half. packHalf2x16 may truncate, so the
 // value is rounded to nearest even before.
 #ifndef DARB_HALF_GLSL
 #define DARB_HALF_GLSL
@@ -8,7 +8,7 @@
 
 layout(constant_id = 140) const int STORAGE = STORAGE_FLOAT32;
 
-const float HALF_LEAST = 6.1035156e-5;  // the smallest with all its bits
+const float HALF_LEAST = 6.1035156e-5;  // the smallest half with full precision
 const float HALF_LARGEST = 65504.0;
 
 float round_half(float x) {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The intersections of a stretch of the tile's list that touch the subgroup's area, packed together, so that the loop
-// over them has neither gaps nor branches. Needs the constants THREADS, SUBGROUP_SIZE and CHUNK, the intersections that
-// are looked at before those found are worked off, and the buffers intersection_from_sorted and
-// splat_from_intersection.
+// Packs the intersections of a stretch of the tile's list that touch the subgroup's area, so that the loop over them
+// has neither gaps nor branches. Needs the constants THREADS, SUBGROUP_SIZE and CHUNK (how many intersections are
+// looked at before those found are blended) and the buffers intersection_from_sorted and splat_from_intersection.
 #include "lib/lockstep.glsl"
 
 shared uint hit_splat[THREADS / SUBGROUP_SIZE * CHUNK];
@@ -12,12 +11,12 @@ uint hits_base() {
     return gl_SubgroupID * CHUNK;
 }
 
-// Fills the subgroup's lists from intersections [begin, end), at least one and at most CHUNK of them, that have one of
-// bits; returns how many.
+// Fills the subgroup's lists with those of the intersections [begin, end), at least one and at most CHUNK of them, that
+// have one of the bits. Returns how many.
 uint collect_hits(uint begin, uint end, uint bits) {
-    order_within_subgroup();  // the lists may still be read
+    order_within_subgroup();  // other lanes may still read the lists
     uint count = 0u, batch = begin;
-    do {  // ends at its bottom: see emit_cells
+    do {  // tested at the bottom: see emit_cells
         const uint j = batch + gl_SubgroupInvocationID;
         uint intersection = 0u;
         if (j < end) intersection = splat_from_intersection[intersection_from_sorted[j]];

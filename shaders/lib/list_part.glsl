@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stretch of a tile's list that a dispatch works off. Needs the specialization constant SEGMENT: intersections of a
+// The stretch of a tile's list that a dispatch processes. Needs the specialization constant SEGMENT: intersections per
 // stretch, or 0 for whole lists in one dispatch.
 uvec2 list_part(uvec2 range) {
     if (SEGMENT == 0u) return range;

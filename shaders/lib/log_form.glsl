@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The Gaussian by logarithms: opacity * w = 2^e, e = log2(opacity) - x^2 - y^2 with the factor scaled by FACTOR_SCALE.
-// It takes neither a product for the scale of the exponent nor one for the opacity. Where the slope is -w/2, LOG_FORM.
+// The Gaussian by logarithms: opacity * w = 2^e, e = log2(opacity) - x^2 - y^2, with the factor scaled by FACTOR_SCALE.
+// This saves the products for the scale of the exponent and for the opacity. LOG_FORM is true where the slope is -w/2.
 // Needs kernels/kernel.glsl.
 #ifndef DARB_LOG_FORM_GLSL
 #define DARB_LOG_FORM_GLSL

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The sums of splat-tile intersections, PARTIALS floats each, in the order of the intersections' slots: blend_backward
+// The sums of splat-tile intersections, PARTIALS floats each, in the order of the intersections' slots. blend_backward
 // adds to them (define PARTIALS_PUT as +=), blend_backward_team sets them (as =), blend_backward_pixels sets four at a
-// time (PARTIALS_PUT_FOURS), others read them. Where they are more than one binding holds, the buffer is bound
-// in PARTIAL_WINDOWS windows of WINDOW_INTERSECTIONS intersections each, from PARTIALS_BINDING on.
+// time (PARTIALS_PUT_FOURS), and others read them. Where one binding cannot hold them, the buffer is bound in
+// PARTIAL_WINDOWS windows of WINDOW_INTERSECTIONS intersections each, from PARTIALS_BINDING on.
 
 layout(constant_id = 9) const uint WINDOW_INTERSECTIONS = 0;  // 0: the first window has them all
 
@@ -22,7 +22,7 @@ PARTIALS_WINDOW(2) Partials2 { PARTIALS_OF partials2[]; };
 PARTIALS_WINDOW(3) Partials3 { PARTIALS_OF partials3[]; };
 PARTIALS_WINDOW(4) Partials4 { PARTIALS_OF partials4[]; };
 
-// The window of a slot, which becomes the number within it.
+// The window of a slot; the slot becomes the number within the window.
 uint partial_window(inout uint slot) {
     if (WINDOW_INTERSECTIONS == 0u) return 0u;
     const uint window = slot / max(WINDOW_INTERSECTIONS, 1u);
@@ -40,7 +40,7 @@ void put_partial(uint slot, uint i, float value) {
     else partials4[at] PARTIALS_PUT value;
 }
 #elif defined(PARTIALS_PUT_FOURS)
-// part: as below.
+// part: as for load_partial.
 void put_four(uint slot, uint part, vec4 value) {
     const uint window = partial_window(slot), at = 2u * slot + part;
     if (WINDOW_INTERSECTIONS == 0u || window == 0u) partials0[at] = value;
@@ -50,7 +50,7 @@ void put_four(uint slot, uint part, vec4 value) {
     else partials4[at] = value;
 }
 #else
-// part: 0, the first four of an intersection's sums, or 1, the others.
+// part: 0 for the first four of an intersection's sums, or 1 for the others.
 vec4 load_partial(uint slot, uint part) {
     const uint window = partial_window(slot), at = 2u * slot + part;
     if (WINDOW_INTERSECTIONS == 0u || window == 0u) return partials0[at];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Projected splats as project.comp leaves them for the passes over intersections, in float32 or float16.
-// Needs SHAPE_BINDING, LIGHT_BINDING and BOUND_BINDING; each buffer has two views, of which STORAGE picks one.
+// Projected splats as project.comp leaves them for the passes over intersections, in float32 or float16. Needs
+// SHAPE_BINDING, LIGHT_BINDING and BOUND_BINDING; each buffer has two views, and STORAGE picks one.
 #include "lib/half.glsl"
 
 layout(set = 0, binding = SHAPE_BINDING, scalar) readonly buffer SplatShape { vec4 splat_shape[]; };
@@ -17,7 +17,7 @@ vec4 load_light(uint splat) {  // rgb, opacity
 }
 #endif
 
-// mean, l11, l21; and l22.
+// Returns mean, l11, l21; l22 goes to the argument.
 vec4 load_shape(uint splat, out float l22) {
     if (STORAGE == STORAGE_FLOAT32) {
         l22 = splat_bound[splat].x;

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Splats as the lanes of a subgroup share them: each lane loads one and leaves it in shared memory, from where all read
-// it by one address, 16 bytes at a time: three loads a splat in place of a shuffle for each of its numbers. An area is
-// one block here, and positions are relative to its centre, so that (x, y) is a plane over its pixels whose offsets are
-// constants of the lane: nothing cancels but what did in (x, y) of the centre.
-// Needs RECORDS, those of the workgroup, splat_exponent, kernels/kernel.glsl, lib/projected.glsl, lib/area.glsl and
-// lib/depth_sum.glsl.
+// Splats as the lanes of a subgroup share them. Each lane loads one and leaves it in shared memory, from where all
+// lanes read it at the same address, 16 bytes at a time: three loads per splat in place of a shuffle for each of its
+// numbers. An area is one block here, and positions are relative to its centre, so that (x, y) is linear over its
+// pixels, with offsets that are constants of the lane. Nothing cancels but what did so in (x, y) of the centre.
+// Needs RECORDS (how many the workgroup has), splat_exponent, kernels/kernel.glsl, lib/projected.glsl, lib/area.glsl
+// and lib/depth_sum.glsl.
 #include "lib/lockstep.glsl"
 #include "lib/log_form.glsl"
 
-const uint RECORD = 3u;  // vec4 of a record
+const uint RECORD = 3u;  // vec4s per record
 shared vec4 records[RECORDS * RECORD];
 
-// Where those of the subgroup begin.
+// Where the subgroup's records begin.
 uint records_base() {
     return gl_SubgroupID * (RECORDS / AREAS) * RECORD;
 }
@@ -26,7 +26,7 @@ struct Record {
     uint number;     // 1 + the intersection
 };
 
-// centre: of the area, px.
+// centre: the area's, px.
 Record make_record(uint splat, uint number, vec2 centre) {
     Record r;
     const vec4 shape = load_shape(splat, r.l22), light = load_light(splat);
@@ -57,8 +57,8 @@ Record load_record(uint at) {
     return Record(a.xy, a.z, a.w, c.x, b.rgb, b.w, c.z, c.w, floatBitsToUint(c.y));
 }
 
-// The centre of a block, px, and the offset from it of the thread's first pixel there; its others are at
-// + slot_offset(k).
+// The centre of a block, px, and the offset from it of the thread's first pixel there; its others are at +
+// slot_offset(k).
 vec2 block_centre(uvec2 tile, uint block) {
     return vec2(tile * TILE_SIZE + slot_to_pixel(block * BLOCK_PIXELS)) + 4.0;
 }
@@ -66,12 +66,13 @@ vec2 first_offset() {
     return vec2(slot_to_pixel(gl_SubgroupInvocationID)) - 3.5;
 }
 
-// (x, y) of a pixel.
+// (x, y) at a pixel.
 vec2 whitened(Record r, vec2 offset) {
     return vec2(fma(-r.l21, offset.y, fma(-r.l11, offset.x, r.centre.x)), fma(-r.l22, offset.y, r.centre.y));
 }
 
-// opacity * w before any limit. slope: dw/dq, w and by_exponent: dw/d(exponent), all without LOG_FORM alone.
+// opacity * w before any limit. slope is dw/dq; slope, w and by_exponent (dw/d(exponent)) are only set without
+// LOG_FORM.
 float record_alpha(Record r, vec2 offset, out float w, out float slope, out float by_exponent) {
     const vec2 at = whitened(r, offset);
     w = slope = by_exponent = 0.0;

@@ -12,7 +12,7 @@ const float SH_C3[7] = float[](-0.5900435899266435, 2.890611442640554, -0.457045
                                -0.5900435899266435);
 const int SH_REST_MAX = 15;
 
-// basis[k]: coefficient k+1 at the unit direction d; entries above SH_DEGREE are left unset.
+// basis[k] is the value of coefficient k+1 at the unit direction d; entries above SH_DEGREE are left unset.
 void sh_basis(vec3 d, out float basis[SH_REST_MAX]) {
     const float x = d.x, y = d.y, z = d.z;
     if (SH_DEGREE >= 1) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// What the floats of a splat stand for. As files and training have them: the logit of the opacity, logarithms of
-// scales, harmonics of a colour that is clamped at 0. LINEAR_VALUES: the opacity and the scales themselves, as
-// calls of renderers give them. DIRECT_COLOUR: sh_dc is the colour, of any sign, and there are no other harmonics.
+// The meaning of a splat's floats. In files and in training they are the logit of the opacity, logarithms of scales,
+// and harmonics of a colour that is clamped at 0. With LINEAR_VALUES they are the opacity and the scales themselves, as
+// callers of renderers pass them. With DIRECT_COLOUR, sh_dc is the colour, of any sign, and there are no other
+// harmonics.
 
 layout(constant_id = 210) const int LINEAR_VALUES = 0;
 layout(constant_id = 211) const int DIRECT_COLOUR = 0;
@@ -16,6 +17,6 @@ vec3 scale_of(vec3 stored) {
     return exp(clamp(stored, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT));
 }
 
-// The first band, and what the sum of all bands is at least.
+// The first band, and the least value of the sum of all bands.
 vec3 first_band(vec3 dc) { return DIRECT_COLOUR == 1 ? dc : 0.5 + SH_C0 * dc; }
 vec3 shown_colour(vec3 sum) { return DIRECT_COLOUR == 1 ? sum : max(sum, 0.0); }

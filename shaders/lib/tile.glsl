@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The part of a splat's ellipse within a band of pixel rows, for the tiles of a splat and the blocks of a tile: a
-// rectangle is touched where its rows' part of the ellipse reaches its columns.
+// The part of a splat's ellipse within a band of pixel rows, for the tiles of a splat and the blocks of a tile: the
+// ellipse touches a rectangle where its part in the rectangle's rows reaches the rectangle's columns.
 
-// The ellipse of one splat, q <= reach, with slack for rounding: what a pass skips must be below the alpha cut-off for
-// certain.
+// The ellipse of one splat, q <= reach, with slack for rounding: what a pass skips must certainly be below the alpha
+// cut-off.
 struct EllipseRows {
     vec2 mean;             // px
     float l21, l22, width; // width: 1 / l11
@@ -25,18 +25,19 @@ EllipseRows ellipse_rows(vec2 mean, float l11, float l21, float l22, float reach
     return e;
 }
 
-// The lowest and highest x, in px, of the ellipse between two rows of pixel centres; low > high: it is not there.
+// The lowest and highest x, in px, of the ellipse between two rows of pixel centres; low > high where it has none.
 vec2 columns_between(EllipseRows e, float low_y, float high_y) {
     const float near = max(e.mean.y - high_y, -e.top), far = min(e.mean.y - low_y, e.top);
-    const float right = clamp(e.lean, near, far), left = clamp(-e.lean, near, far);  // dy of the largest, smallest dx
+    // dy of the largest and of the smallest dx
+    const float right = clamp(e.lean, near, far), left = clamp(-e.lean, near, far);
     const float v = e.l22 * right, w = e.l22 * left;
     const float most = (sqrt(max(e.reach - v * v, 0.0)) - e.l21 * right) * e.width;
     const float least = (sqrt(max(e.reach - w * w, 0.0)) + e.l21 * left) * -e.width;
     return near > far ? vec2(1.0, -1.0) : e.mean.x - vec2(most, least);
 }
 
-// A splat's tiles: a rectangle of tiles cut into at most 8 x 8 cells, with one bit for each cell that the
-// ellipse touches. Count and emission both read this, so they cannot disagree.
+// A splat's tiles: a rectangle of tiles cut into at most 8 x 8 cells, with one bit for each cell that the ellipse
+// touches. Counting and emission both read this, so they cannot disagree.
 struct TileCover {
     uvec2 origin;  // tile
     uvec2 extent;  // tiles

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The resorting window of DEPTH_ORDER_PIXEL: a pixel holds back the last WINDOW samples, sorted by their depth at
-// the pixel, and blends the nearest when one more comes. Source: StopThePop (Radl et al. 2024), its last level.
-// Depth at a pixel: the mean of the splat's depth there, z - slope . (x, y), which is exact for the affine
+// The resorting window of DEPTH_ORDER_PIXEL: a pixel holds back the last WINDOW samples, sorted by their depth at the
+// pixel, and blends the nearest when another one comes. Source: the last level of StopThePop (Radl et al. 2024). The
+// depth at a pixel is the mean of the splat's depth there, z - slope . (x, y), which is exact for the affine
 // projection; (x, y) is the whitened offset.
 #include "lib/depth.glsl"
 
 const uint WINDOW = DEPTH_ORDER == DEPTH_ORDER_PIXEL ? DEPTH_WINDOW : 1u;
 const float NO_DEPTH = -3e38;  // depth of an empty place, which comes out first and has no alpha
 
-// The thread's own, [WINDOW][PIXELS]; not parameters, which some compilers copy at every call.
+// Private to the thread, [WINDOW][PIXELS]. They are not parameters, because some compilers would copy those at every
+// call.
 float window_depth[WINDOW * PIXELS];
 vec4 window_light[WINDOW * PIXELS];  // colour, alpha
 
@@ -19,7 +20,7 @@ void clear_window(uint k) {
     }
 }
 
-// Puts a sample in its place in the window of pixel k and returns the light of the nearest of all.
+// Puts a sample in its place in the window of pixel k and returns the light of the nearest of them all.
 vec4 exchange_nearest(uint k, float depth, vec4 light) {
     for (uint i = WINDOW; i > 0u; --i) {
         const uint at = (i - 1u) * PIXELS + k;

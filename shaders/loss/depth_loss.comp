@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The gradient of the loss of depths: the absolute difference of a pixel's depth D = sum w z / sum w, w the weight of
-// each splat and z its depth along the optical axis, from the one that was measured there, world units. It counts where
-// there is one, and where the splats cover at least half of the pixel: of less no surface follows. Place: after the
-// loss of the colours, before blend_backward.
-// Work: one thread a pixel. Shared memory: none. Reads the picture, transmittance, photo; writes the planes of d_image
-// behind the colours, that of 1 - transmittance added to with ADD.
+// The gradient of the depth loss, which is the absolute difference between a pixel's depth D = sum w z / sum w (w the
+// weight of each splat, z its depth along the optical axis) and the depth that was measured there, in world units. It
+// counts where there is a measured depth and the splats cover at least half of the pixel; with less there is no surface
+// to compare.
+// Place: after the loss of the colours, before blend_backward.
+// Work: one thread per pixel. Shared memory: none. Reads the picture, transmittance and photo; writes the planes of
+// d_image behind the colours. With ADD it adds to that of 1 - transmittance.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -13,7 +14,8 @@
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
-layout(constant_id = 1) const int USE_ALPHA = 1;  // 1: what the photo leaves out or shows the background of has none
+// 1: no depth counts where the photo is masked or shows the background
+layout(constant_id = 1) const int USE_ALPHA = 1;
 layout(constant_id = 2) const int ADD = 0;
 
 #include "lib/depth_sum.glsl"

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// A smaller photo: every pixel is the mean of the area that it covers, colours weighted by their alpha. With DEPTHS
-// depths follow, of the measured pixel nearest to the middle of that area: a mean of two surfaces lies on neither.
-// Place: the resolution ramp, once a photo and step. Work: one thread a pixel of the result. Shared memory: none.
+// Makes a smaller photo: every pixel is the mean of the area that it covers, with colours weighted by their alpha. With
+// DEPTHS the depths follow, each taken from the measured pixel nearest to the middle of the area, because a mean of two
+// surfaces lies on neither.
+// Place: the resolution ramp, once for each photo and step.
+// Work: one thread per pixel of the result. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// (1 - lambda) L1 + lambda (1 - SSIM) and its gradient, forward and backward in one walk. Place: after blend.
-// Source: 3DGS equation 7; SSIM of Wang et al. 2004, 11x11 Gaussian window of sigma 1.5, zero padding.
-// With a = x + y, b = x - y (x rendered, y photo) SSIM needs four blurred maps: a, b, a^2, b^2; its gradient
-// needs three: of dS/dmean, dS/dE[a^2], dS/dE[b^2].
-// Work: LANES neighbouring lanes own a strip of LANES * COLUMNS columns of one channel and walk down its rows;
-// each lane keeps COLUMNS columns of the last 11 rows in registers and gets the 5 columns beside its own from
-// its neighbours. LOSS_HALO columns and rows on each side are computed twice: no intermediate image, no
-// shared memory, no barrier; loss_maps.comp is the other way. Reads image, photo; writes d_image and a partial sum for each strip.
+// (1 - lambda) L1 + lambda (1 - SSIM) and its gradient, forward and backward in one walk.
+// Place: after blend. Source: 3DGS equation 7; SSIM of Wang et al. 2004 with an 11x11 Gaussian window of sigma 1.5 and
+// zero padding. With a = x + y and b = x - y (x rendered, y photo), SSIM needs four blurred maps: a, b, a^2, b^2. Its
+// gradient needs three: those of dS/dmean, dS/dE[a^2] and dS/dE[b^2].
+// Work: LANES neighbouring lanes own a strip of LANES * COLUMNS columns of one channel and walk down its rows. Each
+// lane keeps COLUMNS columns of the last 11 rows in registers and gets the 5 columns beside its own from its
+// neighbours. LOSS_HALO columns and rows on each side are computed twice. There is no intermediate image, no shared
+// memory and no barrier; loss_maps.comp is the other way. Reads image and photo; writes d_image and a partial sum for
+// each strip.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,7 +20,7 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 8;
 layout(constant_id = 1) const int LANES = 8;    // a power of two, at most the subgroup size
 layout(constant_id = 2) const int COLUMNS = 8;  // LANES * COLUMNS > 2 * LOSS_HALO
-layout(constant_id = 3) const int USE_MASK = 0;  // 1: alpha < 128 makes x = y = 0; else alpha blends y
+layout(constant_id = 3) const int USE_MASK = 0;  // 1: alpha < 128 makes x = y = 0; otherwise alpha blends y
 layout(constant_id = 4) const int USE_ALPHA = 1; // 0: photos are opaque, neither alpha nor background is read
 
 layout(push_constant, scalar) uniform Push { LossArgs args; };
@@ -55,7 +56,7 @@ bool owns(Strip s, int k) {
     return s.slot + k >= LOSS_HALO && s.slot + k < LANES * COLUMNS - LOSS_HALO;
 }
 
-// SSIM of one row and its derivatives, 0 outside the image; returns the sum over owned columns.
+// SSIM of one row and its derivatives, 0 outside the image. Returns the sum over owned columns.
 float ssim_row(Strip s, int row, float mean_a[COLUMNS], float mean_b[COLUMNS], float mean_aa[COLUMNS],
                float mean_bb[COLUMNS], out float d_mean[COLUMNS], out float d_aa[COLUMNS],
                out float d_bb[COLUMNS]) {
@@ -85,7 +86,7 @@ void main() {
         [[unroll]] for (int j = 0; j < 10; ++j) past[0][j][k] = past[1][j][k] = past[2][j][k] = 0.0;
     }
     vec4 sums = vec4(0.0);
-    // Rows above the image are 0, as the sums are at the start.
+    // Rows above the image are 0, as are the sums at the start.
     for (int row = max(s.first - LOSS_HALO, 0); row < s.last + LOSS_HALO; ++row) {
         float mean_a[COLUMNS], mean_b[COLUMNS], mean_aa[COLUMNS], mean_bb[COLUMNS];
         [[unroll]] for (int k = 0; k < COLUMNS; ++k) {

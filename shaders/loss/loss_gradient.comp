@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The loss by tiles, second of two passes: the gradient from the derivatives that loss_maps.comp left, blurred, in the
-// order of loss.comp: across first, then row by row. Work: a workgroup has a tile of one channel, a thread a pixel.
-// Reads image, photo, maps; writes d_image.
+// The second of two passes of the loss by tiles. It blurs the derivatives that loss_maps.comp left and makes the
+// gradient from them, in the order of loss.comp: across first, then row by row.
+// Work: one workgroup per tile of one channel, one thread per pixel. Reads image, photo and maps; writes d_image.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -23,7 +23,7 @@ layout(set = 0, binding = 3, scalar) writeonly buffer GradientOut { float d_imag
 #include "loss/tile.glsl"
 #include "loss/window.glsl"
 
-// A plane each: three words a pixel take less than the 16 KiB that every device has.
+// One plane for each: three words per pixel take less than the 16 KiB that every device has.
 shared float d[3][LOSS_SIDE * LOSS_SIDE];
 shared float across[3][LOSS_SIDE * LOSS_TILE];
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The loss by tiles, first of two passes: SSIM and its derivatives. For devices where the strips of loss.comp, with
-// their 100 and more values a thread, cost more: this way a thread holds few, needs no subgroup operations, and the
-// three derivatives of a pixel go through memory. Source and sums as in loss.comp, operations in the same order.
-// Work: a workgroup has a tile of one channel, a thread a pixel. Reads image, photo; writes maps, and the tile's
+// The first of two passes of the loss by tiles: SSIM and its derivatives. They are for devices where the strips of
+// loss.comp cost more with their 100 values and more per thread. Here a thread holds few values and needs no subgroup
+// operations, and the three derivatives of a pixel go through memory. Source and sums are as in loss.comp, with the
+// operations in the same order.
+// Work: one workgroup per tile of one channel, one thread per pixel. Reads image and photo; writes maps and the tile's
 // partial sum.
 #version 460
 #extension GL_GOOGLE_include_directive : require

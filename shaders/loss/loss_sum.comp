@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Adds the partial sums of the strips in a fixed order: bit-equal from run to run. Place: after loss.
-// Work: one workgroup; each thread adds every LOSS_SUM_THREADS-th strip, then a tree in shared memory
-// (LOSS_SUM_THREADS vec4). Reads the partial sums; writes one LossResult.
+// Adds the partial sums of the strips in a fixed order, so that every run gives the same bits.
+// Place: after loss.
+// Work: one workgroup; each thread adds every LOSS_SUM_THREADS-th strip, and then a tree in shared memory
+// (LOSS_SUM_THREADS vec4) adds the threads. Reads the partial sums; writes one LossResult.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

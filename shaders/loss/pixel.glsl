@@ -5,7 +5,7 @@ bool in_image(int x, int y) {
     return x >= 0 && x < int(args.width) && y >= 0 && y < int(args.height);
 }
 
-// Whether the pixel `at` of the photo is no masked one.
+// Whether the photo's pixel `at` is not masked.
 bool is_compared(uint at) {
     return USE_ALPHA == 0 || USE_MASK == 0 || photo[at] >= 0x80000000u;
 }

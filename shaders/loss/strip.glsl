@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The SSIM window walked down and across a strip. Loop bounds and indices are constants after unrolling: everything
-// stays in registers. The includer declares LANES and COLUMNS.
+// The SSIM window as it walks down and across a strip. Loop bounds and indices are constants after unrolling, so
+// everything stays in registers. The includer declares LANES and COLUMNS.
 
 // Mean and mean square of the 11 rows at column k.
 void blur_down(in float v[11][COLUMNS], int k, out float mean, out float mean_square) {
@@ -11,7 +11,7 @@ void blur_down(in float v[11][COLUMNS], int k, out float mean, out float mean_sq
     mean_square = blur(q[5], q[4] + q[6], q[3] + q[7], q[2] + q[8], q[1] + q[9], q[0] + q[10]);
 }
 
-// The lane DELTA beside this one in its cluster, cyclic: what wraps lands in the halo.
+// The lane DELTA beside this one in its cluster, cyclic; what wraps around lands in the halo.
 uint lane_beside(int delta) {
     const uint lane = gl_SubgroupInvocationID, last = uint(LANES - 1);
     return (lane & ~last) | ((lane + uint(delta)) & last);
@@ -30,8 +30,8 @@ void blur_across(inout float v[COLUMNS]) {
     }
 }
 
-// Adds one row to the sums of the 11 rows that its window reaches; returns the one that is complete,
-// 5 rows above. sums[j]: of the row j - 4 below the new one, before this call.
+// Adds one row to the sums of the 11 rows that its window reaches, and returns the sum that is complete, 5 rows above.
+// sums[j] belongs to the row j - 4 below the new one, before this call.
 float step_down(inout float sums[10][COLUMNS], int k, float v) {
     const float taps[11] =
         float[](TAP5, TAP4, TAP3, TAP2, TAP1, TAP0, TAP1, TAP2, TAP3, TAP4, TAP5);

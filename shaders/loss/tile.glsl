@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Tiles of the loss: which one a workgroup has. A row of workgroups has the channels of each tile side by side.
+// The tiles of the loss, and which one a workgroup has. A row of workgroups has the channels of each tile side by side.
 
 struct Tile {
     int channel;
     int left, top;  // px
-    uint work;      // among all
+    uint work;  // the tile's number among all
 };
 
 Tile tile_of() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Copies a buffer and nothing else: the rate of a device's memory, where its own copies go another way.
-// Work: vectors of four floats, each thread one of every so many. Shared memory: none.
+// Copies a buffer and does nothing else. It measures the rate of a device's memory, because the device's own copies may
+// go another way.
+// Work: vectors of four floats, which the threads take in turn. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

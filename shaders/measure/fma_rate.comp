@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Multiply-adds in registers and nothing else: the arithmetic rate of a device.
-// Work: MEASURE_STEPS steps of MEASURE_CHAINS chains a thread. Shared memory: none.
+// Does multiply-adds in registers and nothing else: the arithmetic rate of a device.
+// Work: MEASURE_STEPS steps of MEASURE_CHAINS chains per thread. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -17,7 +17,7 @@ void main() {
     const vec4 factor = vec4(args.factor), term = vec4(args.term);
     vec4 a = vec4(start, start + 1.0, start + 2.0, start + 3.0), b = a + 4.0, c = a + 8.0;  // MEASURE_CHAINS
     for (int i = 0; i < MEASURE_STEPS / 8; ++i) {
-        for (int k = 0; k < 8; ++k) {  // unrolled: a loop counter costs as much as six
+        for (int k = 0; k < 8; ++k) {  // unrolled, because a loop counter costs as much as six
             a = fma(a, factor, term);
             b = fma(b, factor, term);
             c = fma(c, factor, term);

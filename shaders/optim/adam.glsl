@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One Adam step of one parameter (Kingma and Ba 2015, bias correction as in PyTorch).
-// moment = (first, second); the result goes back into it. A pass with betas of its own names them before.
+// One Adam step of one parameter (Kingma and Ba 2015, bias correction as in PyTorch). moment = (first, second), and the
+// result goes back into it. A pass with betas of its own defines them before including this.
 
 #ifndef ADAM_BETA1
 #define ADAM_BETA1 0.9
@@ -17,7 +17,7 @@ float adam_step(float parameter, inout vec2 moment, float gradient, float rate) 
            rate * moment.x / (sqrt(moment.y) * args.inverse_sqrt_correction2 + ADAM_EPSILON);
 }
 
-// The steps of several parameters at once, whose moments are as many pairs.
+// The steps of several parameters at once, with as many pairs of moments.
 struct Moments3 { vec4 first; vec2 last; };
 vec3 adam_step(vec3 parameter, inout Moments3 moments, vec3 gradient, float rate) {
     parameter.x = adam_step(parameter.x, moments.first.xy, gradient.x, rate);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The Adam step of one attribute, of gradients that stand in buffers: of several views, or the caller's own.
-// The same step as project_backward.comp makes of one view, with its regularisers and limits.
-// Place: once an attribute and range, after the gradients of all views. Source: Kingma and Ba 2015.
-// Work: one thread a float, of harmonics above the first band a column (lib/rows.glsl). Shared memory: none. Does nothing when a frame overflowed its intersection buffers.
-// A splat with a gradient that was not finite is left as it is; a float whose own is not is counted and left.
+// The Adam step of one attribute from gradients in buffers, which come from several views or from the caller. It is the
+// same step that project_backward.comp makes from one view, with its regularisers and limits.
+// Place: once for each attribute and range, after the gradients of all views. Source: Kingma and Ba 2015.
+// Work: one thread per float, or per column for the harmonics above the first band (lib/rows.glsl). Shared memory:
+// none. Does nothing when a frame overflowed its intersection buffers. A splat with a gradient that was not finite is
+// left as it is; a float whose own gradient is not finite is counted and left.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -20,12 +21,13 @@ layout(constant_id = 2) const int STEP = STEP_PLAIN;
 layout(constant_id = 3) const int REST = REST_EACH;
 
 layout(push_constant, scalar) uniform Push { AdamUpdateArgs args; };
-layout(set = 0, binding = 0, scalar) buffer Value { float value[]; };  // only the range's, like the next two and rest_sum
+// only the range's, as are the next two and rest_sum
+layout(set = 0, binding = 0, scalar) buffer Value { float value[]; };
 layout(set = 0, binding = 1, scalar) buffer Moment { vec2 moment[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Gradient { float gradient[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Views { vec2 views[]; };  // [N] sum of norms, views
 layout(set = 0, binding = 5, scalar) buffer Status { FrameStatus status; };
-// With STEP_REST, in columns.
+// With STEP_REST they lie in columns.
 layout(set = 0, binding = 0, scalar) buffer ValueColumn { vec4 value_column[]; };
 layout(set = 0, binding = 1, scalar) buffer MomentColumn { vec4 moment_column[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer GradientColumn { vec4 gradient_column[]; };
@@ -46,7 +48,8 @@ float regulariser(float x) {
     return args.weight * o * (1.0 - o);
 }
 
-// Two floats of a column: their values, gradients and moments; all that is in use and sound.
+// Steps two floats of a column, with their values, gradients and moments, where they are in use and their gradients are
+// finite.
 void step_pair(bvec2 used, inout vec2 values, vec2 gradients, uint moments_at) {
     if (!any(used)) return;
     vec4 m = moment_column[moments_at];
@@ -95,7 +98,7 @@ void main() {
         atomicAdd(status.bad_gradients, 1u);
         return;
     }
-    // In the loss of each view that shows the splat, and of a share of the others.
+    // Part of the loss of each view that shows the splat, and of a share of the others.
     if (STEP == STEP_SCALE || STEP == STEP_OPACITY) {
         const float share = max(shown * args.gradient_scale, args.regularise_unseen);
         if (share > 0.0) g += share * regulariser(value[at]);

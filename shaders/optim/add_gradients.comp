@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Adds one buffer of gradients to another: those of another view or process, in the order that the host chose.
-// Place: before adam_update. Work: one thread a float. Shared memory: none.
+// Adds one buffer of gradients to another, those of another view or process, in the order that the host chose.
+// Place: before adam_update.
+// Work: one thread per float. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Adds what the views of a step show of each splat to the sums that density control reads. Place: after adam_update.
-// Work: one thread a splat. Shared memory: none. Does nothing when a frame overflowed its intersection buffers; a splat
-// with a gradient that was not finite adds nothing.
+// Adds what the views of a step show of each splat to the sums that density control reads.
+// Place: after adam_update.
+// Work: one thread per splat. Shared memory: none. Does nothing when a frame overflowed its intersection buffers; a
+// splat with a gradient that was not finite adds nothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

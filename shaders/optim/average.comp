@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The mean of a parameter over iterations, one more taken in: mean += (value - mean) / iterations so far.
-// Place: the end of a run, between iterations. Work: one thread a float. Shared memory: none.
+// Takes one more iteration into the mean of a parameter: mean += (value - mean) / iterations so far.
+// Place: the end of a run, between iterations.
+// Work: one thread per float. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// One Adam step of one photo's exposure, after which the mean of all maps is the identity again: a change common to
-// all photos is the scene's own. Place: after exposure_backward. Source: Kingma and Ba 2015.
-// Work: a thread a term of the map, or of the grid of maps. Shared memory: none. Does nothing when the frame overflowed its
-// intersection buffers, as the step of the splats, or when the gradient or its square is not finite. Reads partial
-// sums; writes maps, moments.
+// One Adam step of one photo's exposure, after which the mean of all maps is made the identity again, because a change
+// common to all photos belongs to the scene.
+// Place: after exposure_backward. Source: Kingma and Ba 2015.
+// Work: one thread per term of the map, or of the grid of maps. Shared memory: none. Does nothing when the frame
+// overflowed its intersection buffers, as for the splats, or when the gradient or its square is not finite. Reads
+// partial sums; writes maps and moments.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

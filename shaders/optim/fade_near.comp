@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Takes from the opacity of splats that stand nearer to a camera than the scene does, as project_backward.comp does
-// after its own step. Place: after adam_update, once a view. Work: one thread a splat. Shared memory: none.
-// Does nothing when a frame overflowed its intersection buffers, nor to a splat with a gradient that was not finite.
+// Lowers the opacity of splats that stand nearer to a camera than the scene does, as project_backward.comp does after
+// its own step.
+// Place: after adam_update, once for each view.
+// Work: one thread per splat. Shared memory: none. Does nothing when a frame overflowed its intersection buffers, nor
+// to a splat with a gradient that was not finite.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The centre nearest to each row of numbers: the step of k-means that costs. Squared distances less what all
-// centres of a row share, |c|^2 - 2 x c; the first of equal ones wins.
-// Place: SOG's palette of harmonics, engine/publish. Work: a workgroup takes up to ROWS times THREADS rows of one batch, a
-// thread ROWS of them, which it keeps in registers: on lavapipe a load within a loop costs as much as many products.
-// Shared memory: none. Reads groups, rows, centres; writes labels.
+// Finds the centre nearest to each row of numbers, which is the expensive step of k-means. It compares squared
+// distances without the term that all centres of a row share, |c|^2 - 2 x c; among equal ones the first wins.
+// Place: SOG's palette of harmonics, engine/publish.
+// Work: a workgroup takes up to ROWS times THREADS rows of one batch, and a thread ROWS of them, which it keeps in
+// registers: on lavapipe a load within a loop costs as much as many products. Shared memory: none. Reads groups, rows
+// and centres; writes labels.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

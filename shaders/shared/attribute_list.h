@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The attributes of a splat by number: the order of their buffers, moments, gradients and rates, in
-// bindings and in checkpoints. What each is stands in engine/scene/splat_model.h.
+// bindings and in checkpoints. engine/scene/splat_model.h says what each is.
 #ifndef DARB_ATTRIBUTE_LIST_H
 #define DARB_ATTRIBUTE_LIST_H
 
@@ -13,15 +13,15 @@
 #define ATTRIBUTE_SHAPE 6
 #define ATTRIBUTES 7
 
-// The rows of an attribute of each coefficient, on the device: blocks of so many splats, in each a
-// column of as many vec4 after the other (shaders/lib/rows.glsl).
+// An attribute with several coefficients lies on the device in blocks of this many splats; in each
+// block one column of as many vec4 follows the other (shaders/lib/rows.glsl).
 #define ROW_BLOCK 8u
 
-// What a step of the optimizer does beside Adam.
+// What a step of the optimizer does besides Adam.
 #define STEP_PLAIN 0
-#define STEP_SCALE 1    // the regulariser of scales, and none grows beyond the largest
+#define STEP_SCALE 1    // the regulariser of scales, and the limit of the largest scale
 #define STEP_OPACITY 2  // the regulariser of opacities
-#define STEP_REST 3     // a step in every so many iterations, of the mean gradient of these
+#define STEP_REST 3     // one step in several iterations, from their mean gradient
 
 // The zeroth spherical harmonic, sqrt(1 / pi) / 2: colour = 0.5 + SH_C0 * sh_dc + higher bands.
 #define SH_C0 0.28209479177387814

@@ -10,8 +10,8 @@
 namespace darb::gpu {
 #endif
 
-// Rows [first_row, first_row + rows) of the buffers look among [first_centre, first_centre +
-// centres); a workgroup takes some rows of one batch.
+// Rows [first_row, first_row + rows) of the buffers search the centres [first_centre, first_centre
+// + centres); a workgroup takes some rows of one batch.
 struct ClusterGroup {
     uint first_row, rows, first_centre, centres;
 };

@@ -5,17 +5,17 @@
 
 #include "types.h"
 
-#define EXPOSURE_THREADS 64      // threads of a group of exposure_backward
-#define EXPOSURE_MAX_GROUPS 128  // most groups of it: partial sums that the update adds
+#define EXPOSURE_THREADS 64      // threads per group of exposure_backward
+#define EXPOSURE_MAX_GROUPS 128  // most groups of it; the update adds their partial sums
 #define EXPOSURE_TERMS 12        // a 3 x 4 map of colours, row-major
 
-// A bilateral grid of maps: vertices across the picture, down, and by luminance.
+// A bilateral grid of maps, with vertices across the picture, down, and along the luminance.
 #define EXPOSURE_GRID_X 8
 #define EXPOSURE_GRID_Y 8
 #define EXPOSURE_GRID_L 4
 #define EXPOSURE_GRID_VERTICES 256
-#define EXPOSURE_GRID_THREADS 32        // threads of a group of exposure_grid_gradient
-#define EXPOSURE_GRID_SMOOTHNESS 0.001  // weight of half the squared differences of neighbours
+#define EXPOSURE_GRID_THREADS 32        // threads per group of exposure_grid_gradient
+#define EXPOSURE_GRID_SMOOTHNESS 0.001  // weight of half the squared differences between neighbours
 
 #ifdef __cplusplus
 namespace darb::gpu {
@@ -23,7 +23,7 @@ namespace darb::gpu {
 
 struct ExposureArgs {
     uint pixels;  // H W
-    uint view;    // view whose map it is
+    uint view;    // the view whose map it is
     uint groups;  // groups of exposure_backward
     float background_r, background_g, background_b;
     uint width;  // width of the picture, px
@@ -31,10 +31,10 @@ struct ExposureArgs {
 
 struct ExposureUpdateArgs {
     uint view;
-    uint views;   // views that share the mean
+    uint views;   // views whose mean is held
     uint groups;  // partial sums of each term
     uint terms;   // terms per view: those of one map or of a grid
-    float rate;   // lr / (1 - beta1^t), t the visits of this view
+    float rate;   // lr / (1 - beta1^t), t being the visits of this view
     float inverse_sqrt_correction2;
 };
 

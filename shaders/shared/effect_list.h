@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The list of effects: what a scene may call for beyond plain splats. Each is compiled in, has its
-// buffers and its gradients only when it is on. The rules stand in
-// engine/plan/effect_plan.cpp.
+// The list of effects: what a scene may need beyond plain splats. Each is compiled in, and has its
+// buffers and gradients, only when it is on. The rules are in engine/plan/effect_plan.cpp.
 #ifndef DARB_EFFECT_LIST_H
 #define DARB_EFFECT_LIST_H
 
@@ -12,13 +11,13 @@
 #define EFFECT_LENS 4         // lens distortion in the projection
 #define EFFECT_ALPHA 5        // photos with alpha or masks, and a background behind them
 #define EFFECT_DEPTH 6        // a picture of depths
-#define EFFECT_HUGE 7  // splats over very many tiles, and tiles' lists of very many intersections
-#define EFFECT_NEAR 8  // splats beside the picture that reach into it: the Jacobian is clamped
+#define EFFECT_HUGE 7         // splats over very many tiles, and very long lists of tiles
+#define EFFECT_NEAR 8     // splats beside the picture that reach into it; the Jacobian is clamped
 #define EFFECT_CAMERAS 9  // poses and intrinsics are trained beside the splats
 #define EFFECT_COUNT 10
 
 #ifdef __cplusplus
-// On the command line and in files, by number.
+// Their names on the command line and in files, in the order of the numbers.
 #define EFFECT_NAMES \
     "sh", "antialias", "exposure", "off_centre", "lens", "alpha", "depth", "huge", "near", "cameras"
 #endif

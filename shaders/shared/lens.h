@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What C++ and GLSL agree on about the lens of a camera.
+// What C++ and GLSL share about the lens of a camera.
 #ifndef DARB_LENS_H
 #define DARB_LENS_H
 

@@ -5,9 +5,9 @@
 
 #include "types.h"
 
-#define LOSS_HALO 10  // px on each side that a strip reads: 5 of the window, forward and backward
+#define LOSS_HALO 10  // px on each side that a strip reads: 5 for the window forward, 5 backward
 #define LOSS_TILE 16  // px, the side of a tile
-#define LOSS_SIDE 26  // px, of what a tile reads: 5 more on each side
+#define LOSS_SIDE 26  // px, side of what a tile reads: 5 more on each side
 #define LOSS_SUM_THREADS 64  // threads of the one workgroup that adds the partial sums
 
 #ifdef __cplusplus
@@ -17,7 +17,7 @@ namespace darb::gpu {
 struct LossArgs {
     uint width;        // px
     uint height;       // px
-    uint rows;         // px, of one strip; of neither rows nor strips where it goes by tiles
+    uint rows;         // px of one strip; unused, like strips, where the loss goes by tiles
     uint strips;       // side by side, each LANES * COLUMNS - 2 * LOSS_HALO px wide
     uint works;        // strips * ceil(height / rows) * 3 channels
     float l1_scale;    // (1 - lambda) / (3 H W): dL/d|x - y|
@@ -37,12 +37,12 @@ struct LossSumArgs {
     float scale;  // 1 / (3 H W)
 };
 
-// Means over 3 H W, of one photo.
+// Means over the 3 H W values of one photo.
 struct LossResult {
     float l1;      // |x - y|
     float ssim;    // the SSIM map
     float mse;     // (clamp(x, 0, 1) - y)^2, for the PSNR of the training batch
-    float weight;  // share of pixels that count: 1, less where USE_MASK leaves some out
+    float weight;  // share of pixels that count: 1, or less where USE_MASK leaves some out
 };
 
 #ifdef __cplusplus

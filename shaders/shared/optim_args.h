@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Arguments of the projection backward with its fused Adam step, of density control, and of the
-// iterates' mean.
+// Arguments of the projection's backward pass with its fused Adam step, of density control, and of
+// the iterates' mean.
 #ifndef DARB_OPTIM_ARGS_H
 #define DARB_OPTIM_ARGS_H
 
@@ -16,21 +16,21 @@ struct ProjectBackwardArgs {
     uint splat_end;    // one past its last
     uint camera_index;
     float low_pass;  // px^2
-    // What follows is read with UPDATE_ADAM. Each rate is lr / (1 - beta1^t), by ATTRIBUTE_*; the
-    // second moment's correction is common.
+    // The members from here on are read with UPDATE_ADAM. Each rate is lr / (1 - beta1^t), by
+    // ATTRIBUTE_*; all share the second moment's correction.
     float rate[ATTRIBUTES];
     float inverse_sqrt_correction2;  // 1 / sqrt(1 - beta2^t)
-    // Regularisers: weights of the sum of opacities and of the sum of scales, over the splats that
-    // the frame shows, or with regularise_unseen = 1 over all.
+    // Regularisers: weights of the sum of opacities and of the sum of scales. They act on the
+    // splats that the frame shows, or on all with regularise_unseen = 1.
     float opacity_weight, scale_weight;
     uint regularise_unseen;
     float largest_log_scale;  // no scale grows beyond it
     float clearance;          // world: splats nearer to the camera fade
-    float rest_share;         // weight of an iteration's gradient in the mean that a step uses
+    float rest_share;         // weight of one iteration's gradient in the mean that a step uses
 };
 
-// What project_backward does with a splat's gradients: take the Adam step, store them in the
-// buffers of gradients, or add them to what these hold.
+// What project_backward does with a splat's gradients: it takes the Adam step, stores them in the
+// buffers of gradients, or adds them to what these hold.
 #define UPDATE_ADAM 0
 #define UPDATE_STORE 1
 #define UPDATE_ADD 2
@@ -39,18 +39,19 @@ struct ProjectBackwardArgs {
 struct AdamUpdateArgs {
     uint first_splat, splat_count;
     uint floats_in_use;                  // floats per splat to update; the others are left alone
-    float rate;                          // as above
-    float inverse_sqrt_correction2;      // as above
+    float rate;                          // as in ProjectBackwardArgs
+    float inverse_sqrt_correction2;      // as in ProjectBackwardArgs
     float beta1, share1, beta2, share2;  // share = 1 - beta
-    float gradient_scale;                // scales what the buffers of gradients hold
-    float weight;             // weight of the attribute's regulariser in each view's loss
-    float regularise_unseen;  // share of the views whose regularisers act on what they do not show
-    float largest;            // STEP_SCALE: no value grows beyond it
-    float rest_share;         // STEP_REST: as above
+    float gradient_scale;                // factor for what the buffers of gradients hold
+    float weight;  // weight of the attribute's regulariser in each view's loss
+    // share of the views that do not show a splat in which the regularisers act all the same
+    float regularise_unseen;
+    float largest;     // STEP_SCALE: no value grows beyond it
+    float rest_share;  // STEP_REST: as in ProjectBackwardArgs
 };
 
-// What the views of a step show of a splat is (sum of norms, views); so much less of the latter
-// where a gradient was not finite, which the counts of views never make up for: no step is made.
+// What the views of a step show of a splat is (sum of norms, views). A gradient that is not finite
+// lowers the latter by so much that counts of views never make up for it, and no step is made.
 #define VIEWS_BAD -1e9
 
 struct AddArgs {  // to += from
@@ -63,8 +64,8 @@ struct FadeNearArgs {
     float clearance;  // world
 };
 
-// dL/d(camera) of a splat: the rotation's nine entries by rows, the centre held, then fx, fy, cx,
-// cy. Beside them in a sum over splats: dL/d(position).
+// dL/d(camera) of a splat: the rotation's nine entries by rows with the centre held, then fx, fy,
+// cx, cy. A sum over splats also has dL/d(position).
 #define CAMERA_SHARES 13u
 #define CAMERA_SUMS 16u
 #define CAMERA_SUM_THREADS 64u
@@ -73,8 +74,9 @@ struct CameraSumArgs {
     uint splat_count;
 };
 
-// When the harmonics above the first band make a step: in this iteration, of its own gradient; not
-// in this one, whose gradient is gathered; in this one, of the mean of what was gathered.
+// When the harmonics above the first band make a step: in this iteration, from its own gradient;
+// not in this one, whose gradient is only gathered; or in this one, from the mean of what was
+// gathered.
 #define REST_EACH 0
 #define REST_GATHER 1
 #define REST_APPLY 2
@@ -86,20 +88,22 @@ struct CameraSumArgs {
 #define DENSIFY_PRUNE 3
 
 struct DensifyArgs {
-    uint splat_count;          // N before
-    float gradient_threshold;  // NDC units, on the mean over the frames that saw the splat
-    float clone_split_scale;   // world: largest standard deviation below clones, above splits
-    float prune_opacity;       // below it a splat goes
-    float prune_scale;         // world: above it a splat goes; <= 0: off
-    uint seed;                 // for the split offsets; differs at each call
+    uint splat_count;  // N before
+    // NDC units, compared with the mean over the frames that saw the splat
+    float gradient_threshold;
+    // world: splats with a smaller largest standard deviation are cloned, others are split
+    float clone_split_scale;
+    float prune_opacity;  // a splat below it is pruned
+    float prune_scale;    // world: a splat above it is pruned; <= 0: off
+    uint seed;            // for the split offsets; differs at each call
 };
 
-// One range of the splats after, from one range of the splats before: each is bound from its first
-// on.
+// One range of the splats afterwards, from one range of the splats before. Each is bound from its
+// first splat on.
 struct GatherArgs {
     uint to_first, to_count;
     uint from_first, from_count;
-    uint stride;     // floats per splat of this attribute, or columns of what lies in blocks
+    uint stride;     // floats per splat of this attribute, or columns where it lies in blocks
     uint clear_new;  // 1: zero for new splats (moments), 0: copy
 };
 

@@ -5,7 +5,7 @@
 
 #include "types.h"
 
-#define MORTON_AXIS_BITS 10  // cells of a side of the grid, as a power of two: keys of 30 bits
+#define MORTON_AXIS_BITS 10  // cells along a side of the grid, as a power of two: keys have 30 bits
 
 #ifdef __cplusplus
 namespace darb::gpu {
@@ -14,7 +14,7 @@ namespace darb::gpu {
 struct MortonArgs {
     uint splat_count;
     vec3 low;            // world, the corner of the grid
-    float inverse_cell;  // cells a world unit
+    float inverse_cell;  // cells per world unit
 };
 
 #ifdef __cplusplus

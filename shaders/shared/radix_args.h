@@ -19,7 +19,7 @@ struct RadixPrepareArgs {
     uint block;       // pairs of one workgroup
 };
 
-// What the prepare pass leaves for the others. The first three words are a dispatch command.
+// What the prepare pass leaves for the other passes. The first three words are a dispatch command.
 struct RadixPlan {
     uint groups_x;  // blocks that hold the pairs
     uint groups_y;
@@ -30,7 +30,7 @@ struct RadixPlan {
 struct RadixPassArgs {
     uint shift;   // first bit of this pass's digit
     uint digits;  // values of the digit, a power of two up to RADIX_MAX_DIGITS
-    uint first;   // where the pass's totals begin: RADIX_MAX_DIGITS * its number
+    uint first;   // where the pass's totals begin: RADIX_MAX_DIGITS times its number
 };
 
 #ifdef __cplusplus

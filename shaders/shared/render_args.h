@@ -11,44 +11,45 @@
 #define MAX_GROUPS 65535u  // the portable limit of one dispatch dimension
 #define CULL_REASONS 8     // see CULL_* below
 
-// An intersection names its splat in the low bits and, in the high ones, which of the tile's four 8
-// x 8 blocks its ellipse touches: bit 0 the top left, 1 the top right, 2 the bottom left, 3 the
-// bottom right.
+// An intersection names its splat in the low bits. The high bits say which of the tile's four 8 x 8
+// blocks its ellipse touches: bit 0 the top left, 1 the top right, 2 the bottom left, 3 the bottom
+// right.
 #define INTERSECTION_BLOCK_SHIFT 28
 #define INTERSECTION_SPLAT_MASK 0x0FFFFFFFu
 
-// Intersections of one tile's list that a dispatch of a blend pass works off; longer lists take
-// several. The lavapipe of Mesa 22.3 ends every loop of a subgroup once all of them together made
-// 65,535 rounds, which cuts a list after 51,000 intersections forward and 10,700 backward; and a
-// GPU may end a dispatch that takes seconds.
+// How many intersections of one tile's list a dispatch of a blend pass processes; longer lists take
+// several dispatches. The lavapipe of Mesa 22.3 ends every loop of a subgroup once all of them
+// together have made 65,535 rounds, which cuts a list after 51,000 intersections forward and 10,700
+// backward. A GPU may also end a dispatch that takes seconds.
 #define LIST_SEGMENT 8192u
 
-// Intersections of a tile's list between two checkpoints of the forward blend, where the backward
-// blend works off buckets of them side by side (shaders/lib/bucket.glsl); where subgroups are
-// larger, as many as their threads. A record is four floats for each pixel of the tile.
+// How many intersections of a tile's list lie between two checkpoints of the forward blend, for the
+// backward blend that works on buckets of them side by side (shaders/lib/bucket.glsl). Where
+// subgroups are larger, it is as many as they have threads. A record is four floats for each pixel
+// of the tile.
 #define BUCKET_INTERSECTIONS 32u
 #define CHECKPOINT_BYTES (TILE_SIZE * TILE_SIZE * 16u)
 
-// Sums that the backward blend leaves for an intersection, beside one more in a buffer of its own,
-// and the windows in which their buffer is bound where one binding does not hold it.
+// How many sums the backward blend leaves for an intersection, besides one more in a buffer of its
+// own, and the number of windows in which their buffer is bound where one binding does not hold it.
 #define PARTIALS 8u
 #define PARTIAL_WINDOWS 5u
 
-// A splat of more intersections than this is huge: one thread would write them long after all
-// others are done. With COOPERATE of emit.comp a workgroup of EMIT_HUGE_THREADS writes them, one
-// cell of the cover a thread.
+// A splat with more intersections than this is huge: one thread would still write them long after
+// all others are done. With COOPERATE of emit.comp, a workgroup of EMIT_HUGE_THREADS writes them,
+// one cell of the cover per thread.
 #define HUGE_INTERSECTIONS 256u
 #define EMIT_HUGE_THREADS 64  // cells of a cover
-#define EMIT_HUGE_GROUPS 64u  // that share the huge splats of a frame
+#define EMIT_HUGE_GROUPS 64u  // workgroups that share the huge splats of a frame
 
 // What did not fit into a frame; bits of FrameStatus.overflow.
 #define OVERFLOW_INTERSECTIONS 1u  // more intersections than their buffers hold
 #define OVERFLOW_LISTS 2u          // a tile's list is longer than the blend dispatches take on
 #define OVERFLOW_TOTAL 4u          // the number of intersections exceeds 32 bits
 
-// Why a splat takes no part in a frame; index into FrameStatus.culled.
+// Why a splat takes no part in a frame; indexes FrameStatus.culled.
 #define CULL_NEAR 0        // not in front of the near plane, or position not finite
-#define CULL_ROTATION 1    // quaternion of no direction
+#define CULL_ROTATION 1    // quaternion without a direction
 #define CULL_OPACITY 2     // below the alpha cut-off everywhere
 #define CULL_COVARIANCE 3  // determinant not positive or not finite
 #define CULL_OUTSIDE 4     // touches no tile
@@ -64,7 +65,7 @@ struct CameraData {
     vec3 row1;
     vec3 row2;
     vec3 centre;       // world
-    vec3 centre_rest;  // what float32 leaves of the centre
+    vec3 centre_rest;  // what rounding to float32 leaves of the centre
     vec2 focal;        // px
     vec2 principal;    // px
     vec2 ratio_min;    // x/z and y/z are clamped to [ratio_min, ratio_max] in the Jacobian
@@ -83,11 +84,11 @@ struct CameraData {
     float lens_fold;
 };
 
-// What one frame counts, written by the passes, read by later passes and by the host afterwards.
+// The counts of one frame, written by the passes, read by later passes and afterwards by the host.
 struct FrameStatus {
     uint visible;        // V
     uint intersections;  // K as wanted, may exceed the capacity
-    uint overflow;       // OVERFLOW_*: the frame is to be repeated; sticky until the host clears it
+    uint overflow;       // OVERFLOW_*: the frame must be repeated; sticky until the host clears it
     uint bad_gradients;  // splats whose gradient was not finite
     uint culled[CULL_REASONS];
     uint longest_list;  // intersections of the tile that has the most
@@ -109,7 +110,7 @@ struct ProjectArgs {
 
 struct CompactArgs {
     uint splat_count;  // N
-    float near_plane;  // world units along z: where the 16-bit depth keys begin
+    float near_plane;  // world units along z, where the 16-bit depth keys begin
 };
 
 struct SplatArgs {     // gather_counts
@@ -120,7 +121,7 @@ struct IntersectionArgs {  // frame_groups, emit, tile_ranges, list_lengths
     uint intersection_capacity;
     uint tiles_x;
     uint tile_count;
-    uint list_capacity;  // intersections of one tile that the blend dispatches take on
+    uint list_capacity;  // the longest list of a tile that the blend dispatches process
 };
 
 struct BlendArgs {
@@ -129,7 +130,7 @@ struct BlendArgs {
     uint tiles_x;
     float background_r, background_g, background_b;
     uint segment;   // which segment of every list this dispatch takes, where SEGMENT > 0
-    uint segments;  // in all
+    uint segments;  // how many segments there are
 };
 
 struct BucketArgs {

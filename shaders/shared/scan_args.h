@@ -16,7 +16,7 @@ struct ScanPrepareArgs {
     uint teams_per_group;  // teams of one workgroup
 };
 
-// What the prepare pass leaves for the others. The first three words are a dispatch command.
+// What the prepare pass leaves for the other passes. The first three words are a dispatch command.
 struct ScanPlan {
     uint groups_x;
     uint groups_y;

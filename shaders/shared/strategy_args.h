@@ -6,7 +6,8 @@
 #include "types.h"
 
 #define RELOCATION_OPACITIES 128  // columns of the table of scales
-#define RELOCATION_COUNTS 51      // rows: splats in the place of one, as 3DGS-MCMC counts at most
+// rows: splats in the place of one, as many as 3DGS-MCMC counts at most
+#define RELOCATION_COUNTS 51
 
 #ifdef __cplusplus
 namespace darb::gpu {
@@ -14,10 +15,10 @@ namespace darb::gpu {
 
 struct RelocationArgs {
     uint splat_count;    // N before
-    uint splats_after;   // N after: draws go to the dead, then behind the last
-    uint dead_count;     // how many of the N before are dead
-    uint weight_total;   // sum of the weights of the live
-    float dead_opacity;  // below it a splat is dead
+    uint splats_after;   // N after: draws fill the dead places first, then those behind the last
+    uint dead_count;     // how many of the N splats are dead
+    uint weight_total;   // sum of the weights of the live splats
+    float dead_opacity;  // a splat with less is dead
     float weight_scale;  // integer weight of opacity 1; the sum of all stays below 2^32
     uint seed;           // for the draws; differs at each call
 };
@@ -25,7 +26,7 @@ struct RelocationArgs {
 struct NoiseArgs {
     uint splat_count;
     uint seed;           // differs at each iteration
-    float rate;          // 1 / world unit: what the covariance times a normal vector is scaled by
+    float rate;          // 1 / world unit: factor of the covariance times a normal vector
     float dead_opacity;  // the noise is gated by sigmoid(-100 (opacity - dead_opacity))
 };
 

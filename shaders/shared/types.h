@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // GLSL type names for C++, so that the structs of shaders/shared read the same in both languages.
-// Scalar layout: vec3 is 12 bytes and nothing is padded. Under GLSL this file is empty.
-// A struct is written as: #include "types.h", then (C++ only) a static_assert on its size.
+// Layout is scalar: vec3 is 12 bytes and nothing is padded. Under GLSL this file is empty. A file
+// with structs begins with #include "types.h", and each struct is followed, in C++ only, by a
+// static_assert on its size.
 #ifndef DARB_SHARED_TYPES_H
 #define DARB_SHARED_TYPES_H
 

@@ -7,11 +7,12 @@
 
 #define VIEW_GROUP 64
 
-// What display.comp makes of a frame.
+// What display.comp shows of a frame.
 #define VIEW_COLOUR 0  // the picture
-#define VIEW_ERROR 1   // mean absolute difference to the photo, as heat
-#define VIEW_DEPTH 2   // mean depth of what was blended, as heat; nothing blended: background
-#define VIEW_COUNT 3   // intersections of the tile's list that the pixel walked through, as heat
+#define VIEW_ERROR 1   // mean absolute difference from the photo, as heat
+// mean depth of what was blended, as heat; the background where there was nothing
+#define VIEW_DEPTH 2
+#define VIEW_COUNT 3  // intersections of the tile's list that the pixel walked through, as heat
 
 #ifdef __cplusplus
 namespace darb::gpu {
@@ -26,7 +27,7 @@ struct DisplayArgs {
     float photo_scale;               // px of the frame per photo px
     uint photo_width, photo_height;  // px
     float background_r, background_g, background_b;
-    uint before_width, before_height;  // px of the picture before; 0: there is none
+    uint before_width, before_height;  // px of the previous picture; 0: there is none
 };
 
 // view_depth: replaces each visible splat's colour by (depth between near and far, 1, 0).
@@ -39,8 +40,8 @@ struct DepthLightArgs {
 // panes: one strip of several pictures side by side.
 struct PaneArgs {
     uint width, height;  // px of the frame
-    uint left, right;    // px, columns that are written
-    uint difference;     // 1: the difference to the other picture, as heat
+    uint left, right;    // px, first column and end of the columns that are written
+    uint difference;     // 1: the difference from the other picture, as heat
     float heat_max;      // value that gets the hottest colour
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Radix sort, step 1 of 3 of a pass: how often each digit occurs in each block.
-// One workgroup a block of THREADS * ITEMS keys. Shared memory: 1 KiB of counters.
-// Reads keys [n]; writes histograms [digits][blocks], and adds to the totals [digits] of the pass.
+// Radix sort, step 1 of 3 of a pass: counts how often each digit occurs in each block. One workgroup per block of
+// THREADS * ITEMS keys. Shared memory: 1 KiB of counters. Reads keys [n]; writes histograms [digits][blocks] and adds
+// to the totals [digits] of the pass.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

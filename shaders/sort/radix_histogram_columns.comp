@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Radix sort, step 1 of 3 of a pass, for lavapipe: how often each digit occurs in each block.
-// One workgroup, which is one subgroup, a block of THREADS * ITEMS keys; columns as in
-// radix_scatter_columns.comp.
-// Reads keys [n]; writes histograms [digits][blocks], and adds to the totals [digits] of the pass.
+// Radix sort, step 1 of 3 of a pass, for lavapipe: counts how often each digit occurs in each block. One workgroup,
+// which is one subgroup, per block of THREADS * ITEMS keys, with columns as in radix_scatter_columns.comp. Reads keys
+// [n]; writes histograms [digits][blocks] and adds to the totals [digits] of the pass.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

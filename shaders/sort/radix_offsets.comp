@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Radix sort, step 2 of 3 of a pass: where the keys of each digit and block go, an exclusive sum over all digits and, of
-// a digit, over the blocks. One workgroup a digit: it sums the totals of the digits before its own, and walks its row
-// THREADS blocks at a time. With TEAM_IS_THREAD one thread a digit: see scan_team.glsl. Shared memory: a word a subgroup.
-// Reads totals [RADIX_MAX_DIGITS] of the pass; reads and writes histograms [digits][blocks].
+// Radix sort, step 2 of 3 of a pass: finds where the keys of each digit and block go, by an exclusive sum over all
+// digits and, within a digit, over the blocks. One workgroup per digit: it sums the totals of the lower digits and
+// walks its row THREADS blocks at a time. With TEAM_IS_THREAD, one thread per digit: see scan_team.glsl. Shared memory:
+// one word per subgroup. Reads totals [RADIX_MAX_DIGITS] of the pass; reads and writes histograms [digits][blocks].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -18,12 +18,12 @@ layout(set = 0, binding = 0, scalar) readonly buffer Plan { RadixPlan plan; };
 layout(set = 0, binding = 1, scalar) readonly buffer Totals { uint totals[]; };
 layout(set = 0, binding = 2, scalar) buffer Histograms { uint histograms[]; };
 
-shared uint subgroup_sums[THREADS];  // as many as there can be subgroups
+shared uint subgroup_sums[THREADS];  // the largest possible number of subgroups
 
-// The sum of the values of the threads before this one, and that of all.
+// Returns the sum of the values of the threads before this one; sum gets that of all.
 uint sum_before(uint value, out uint sum) {
     const uint inclusive = subgroupInclusiveAdd(value);
-    barrier();  // the sums may still be read
+    barrier();  // other threads may still read the sums
     if (gl_SubgroupInvocationID == gl_SubgroupSize - 1) subgroup_sums[gl_SubgroupID] = inclusive;
     barrier();
     uint before = inclusive - value;
@@ -46,7 +46,7 @@ void walk_row(uint digit) {
 }
 
 void walk_row_together(uint digit) {
-    // Not by gl_LocalInvocationID: its order need not be that of the subgroups.
+    // gl_LocalInvocationID would not do, because its order need not be that of the subgroups.
     const uint thread = gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
     const uint blocks = plan.groups_x;
     uint smaller = 0, place;

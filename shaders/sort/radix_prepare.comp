@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Radix sort, once a sort: turns the pair count on the device into a block count, and sets the totals to 0.
-// One workgroup. Reads the count; writes the plan, whose head is an indirect dispatch command, and the totals.
+// Radix sort, once per sort: turns the pair count on the device into a block count and sets the totals to 0. One
+// workgroup. Reads the count; writes the plan, whose head is an indirect dispatch command, and the totals.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

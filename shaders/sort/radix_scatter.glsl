@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What both scatter shaders of the radix sort bind (step 3 of 3 of a pass).
+// The bindings that all scatter shaders of the radix sort share (step 3 of 3 of a pass).
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 32;
 layout(constant_id = 1) const uint ITEMS = 256;   // keys of one thread
@@ -21,7 +21,7 @@ uint value_of(uint index) {
     return IOTA ? index : values_in[index];
 }
 
-// Where this block's first key of the digit goes.
+// The place of this block's first key with the digit.
 uint block_offset(uint digit) {
     return offsets[digit * gl_NumWorkGroups.x + gl_WorkGroupID.x];
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Radix sort, step 3 of 3 of a pass, for GPUs: a subgroup ranks a row of keys by one ballot a digit
-// bit; rows of a subgroup are contiguous, so that all reads are. The block's keys are brought in order in shared memory,
-// so that those of a digit are written side by side. After Adinets and Merrill 2022.
-// One workgroup a block of THREADS * ITEMS keys. Shared memory: the block's keys, and a KiB a subgroup and one more.
-// Reads offsets [digits][blocks], keys and values [n]; writes keys and values [n].
+// Radix sort, step 3 of 3 of a pass, for GPUs: a subgroup ranks a row of keys by one ballot per digit bit. The rows of
+// a subgroup are contiguous, so that all reads are. The block's keys are brought into order in shared memory, so that
+// keys with the same digit are written side by side. After Adinets and Merrill 2022. One workgroup per block of THREADS
+// * ITEMS keys. Shared memory: the block's keys, 1 KiB per subgroup, and 1 KiB more. Reads offsets [digits][blocks],
+// keys and values [n]; writes keys and values [n].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -15,14 +15,14 @@
 
 layout(constant_id = 3) const uint SUBGROUPS = 4;  // at least gl_NumSubgroups
 
-const uint RUN = RADIX_MAX_DIGITS / THREADS;  // digits of a thread, where it counts them
+const uint RUN = RADIX_MAX_DIGITS / THREADS;  // digits that a thread counts
 
 shared uint counters[SUBGROUPS * RADIX_MAX_DIGITS];  // [subgroup][digit]
-shared uint digit_places[RADIX_MAX_DIGITS];          // where a digit's keys go, less where they are in the block
+shared uint digit_places[RADIX_MAX_DIGITS];  // where a digit's keys go, less their place in the block
 shared uint subgroup_sums[SUBGROUPS];
-shared uint block_words[THREADS * ITEMS];            // in order
+shared uint block_words[THREADS * ITEMS];  // the block's keys or values in order
 
-// The lanes of the subgroup that hold the same digit; only lanes that are valid.
+// The valid lanes of the subgroup that hold the same digit.
 uvec4 peers_of(uint digit, bool valid) {
     uvec4 peers = subgroupBallot(valid);
     for (uint bit = 1; bit < args.digits; bit <<= 1) {
@@ -33,9 +33,9 @@ uvec4 peers_of(uint digit, bool valid) {
     return peers;
 }
 
-// Counts become places in the block: digit by digit, and keys of earlier subgroups first.
+// Turns counts into places in the block: digit by digit, and keys of earlier subgroups first.
 void place_digits() {
-    // Not by gl_LocalInvocationID: its order need not be that of the subgroups.
+    // gl_LocalInvocationID would not do, because its order need not be that of the subgroups.
     const uint first = RUN * (gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID);
     uint total = 0;
     for (uint d = first; d < first + RUN; ++d) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Radix sort, step 3 of 3 of a pass, for lavapipe: every thread walks ITEMS contiguous keys with a
-// private column of counters, so that neither ranking nor order needs other threads.
-// One workgroup, which is one subgroup, a block of THREADS * ITEMS keys. The columns are an
-// array of registers: on lavapipe these are half as dear as shared memory, and rows of them are vectors.
-// Reads offsets [digits][blocks], keys and values [n]; writes keys and values [n].
+// Radix sort, step 3 of 3 of a pass, for lavapipe: every thread walks ITEMS contiguous keys with a private column of
+// counters, so that neither ranking nor order needs other threads. One workgroup, which is one subgroup, per block of
+// THREADS * ITEMS keys. The columns are an array of registers: on lavapipe these cost half as much as shared memory,
+// and their rows are vectors. Reads offsets [digits][blocks], keys and values [n]; writes keys and values [n].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,7 +18,7 @@ void main() {
     uint column[RADIX_MAX_DIGITS];
     for (uint d = 0; d < RADIX_MAX_DIGITS; ++d) column[d] = 0;
     for (uint i = begin; i < end; ++i) column[digit_of(keys_in[i])] += 1;
-    // Counts become places: keys of earlier threads go first.
+    // Turns counts into places: keys of earlier threads go first.
     for (uint d = 0; d < args.digits; ++d)
         column[d] = block_offset(d) + subgroupExclusiveAdd(column[d]);
     for (uint i = begin; i < end; ++i) {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Scan, step 4 of 4: offsets of every element from the offset of its chunk. One team
-// (scan_team.glsl) a chunk, no shared memory.
-// Reads counts [n], chunk_offsets [chunks]; writes offsets [n]. With IN_PLACE the counts are read where the offsets go,
-// through that one binding: two that are not declared Aliased must not reach one buffer.
+// Scan, step 4 of 4: the offsets of all elements from the offset of their chunk. One team (scan_team.glsl) per chunk,
+// no shared memory. Reads counts [n] and chunk_offsets [chunks]; writes offsets [n]. With IN_PLACE the counts are read
+// where the offsets go, through that one binding: two bindings that are not declared Aliased must not reach one buffer.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -28,7 +27,7 @@ void scan_by_thread(uint begin, uint end, uint prefix) {
     }
 }
 
-// All lanes stay in the loop, for the scan needs them; those past the end add 0.
+// All lanes stay in the loop, because the scan needs them; those past the end add 0.
 void scan_by_subgroup(uint begin, uint end, uint prefix) {
     for (uint row = begin; row < end; row += gl_SubgroupSize) {
         const uint i = row + gl_SubgroupInvocationID;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Scan, step 2 of 4: the sum of every chunk. One team (scan_team.glsl) a chunk, no shared memory.
-// Reads counts [n]; writes chunk_sums [chunks].
+// Scan, step 2 of 4: the sum of every chunk. One team (scan_team.glsl) per chunk, no shared memory. Reads counts [n];
+// writes chunk_sums [chunks].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Teams of the scan: CHUNK contiguous elements belong to one team. On GPUs a team is a subgroup, so
-// that neighbouring lanes touch neighbouring words; on lavapipe it is one thread, because there a
-// loop in registers is far cheaper than a subgroup scan. Nothing depends on the subgroup size but
-// speed: teams stride over the chunks by the number of teams that really run.
+// Teams of the scan: each team owns CHUNK contiguous elements. On GPUs a team is a subgroup, so that neighbouring lanes
+// touch neighbouring words. On lavapipe it is one thread, because there a loop in registers is far cheaper than a
+// subgroup scan. Only the speed depends on the subgroup size: teams stride over the chunks by the number of teams that
+// really run.
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 32;
 layout(constant_id = 1) const uint CHUNK = 256;

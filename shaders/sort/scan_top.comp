@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Scan, step 3 of 4: exclusive prefix sum of the chunk sums, in place, and the total.
-// One workgroup; every thread owns a contiguous run of chunks. Shared memory: a word a subgroup.
+// Scan, step 3 of 4: the exclusive prefix sum of the chunk sums, in place, and the total. One workgroup; every thread
+// owns a contiguous run of chunks. Shared memory: one word per subgroup.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -15,12 +15,12 @@ layout(set = 0, binding = 0, scalar) readonly buffer Plan { ScanPlan plan; };
 layout(set = 0, binding = 1, scalar) buffer ChunkSums { uint chunk_sums[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Total { uint total_out[]; };
 
-shared uint subgroup_sums[THREADS];  // as many as there can be subgroups
+shared uint subgroup_sums[THREADS];  // the largest possible number of subgroups
 
 void main() {
     const uint chunks = plan.chunks;
     const uint run = (chunks + THREADS - 1) / THREADS;
-    // Not by gl_LocalInvocationID: its order need not be that of the subgroups.
+    // gl_LocalInvocationID would not do, because its order need not be that of the subgroups.
     const uint thread = gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
     const uint begin = min(thread * run, chunks);
     const uint end = min(begin + run, chunks);

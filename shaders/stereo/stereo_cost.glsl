@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What a plane costs at a pixel: 1 - correlation of the greys in its window with those of the source photos where
-// the plane puts them, the mean over the better half of the sources. Weights fall with the distance in grey from the
-// middle, so that a window keeps to one surface (as in COLMAP, Schoenberger et al. 2016).
-// A plane is (v, dv/dx, dv/dy): inverse depth at the pixel's centre and its slope, exact for planes in space.
-// Needs args, grey[] and source[] of the including shader: a word has the greys of a pixel and of those right of it,
-// below it, and both, 1 to 255; 0 is no photo.
+// What a plane costs at a pixel: 1 - correlation of the greys in its window with those of the source photos where the
+// plane puts them, as the mean over the better half of the sources. Weights fall with the distance in grey from the
+// middle, so that a window keeps to one surface (as in COLMAP, Schoenberger et al. 2016). A plane is (v, dv/dx, dv/dy):
+// the inverse depth at the pixel's centre and its slope, which is exact for planes in space. Needs args, grey[] and
+// source[] of the including shader: a word has the greys of a pixel, of the one right of it, of the one below it, and
+// of the one right below, 1 to 255; 0 means outside the photo.
 
 struct StereoWindow {
     float grey[STEREO_SAMPLES], weight[STEREO_SAMPLES];
@@ -12,7 +12,7 @@ struct StereoWindow {
     vec2 at;      // px
 };
 
-// Every other pixel of the square, as on a chess board.
+// Takes every other pixel of the square, as on a chessboard.
 ivec2 sample_offset(int k) {
     const int side = 2 * STEREO_RADIUS + 1;
     return ivec2((2 * k) % side, (2 * k) / side) - STEREO_RADIUS;

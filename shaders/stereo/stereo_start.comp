@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A first plane for each pixel: the best of several that face the camera, at inverse depths drawn from as many
-// parts of the range. Place: once a photo, before the sweeps. Work: one thread a pixel. Shared memory: none.
-// Reads greys, sources; writes planes.
+// A first plane for each pixel: the best of several that face the camera, at inverse depths drawn from as many parts of
+// the range.
+// Place: once for each photo, before the sweeps.
+// Work: one thread per pixel. Shared memory: none. Reads greys and sources; writes planes.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

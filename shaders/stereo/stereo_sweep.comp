@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// PatchMatch on a chess board (Barnes et al. 2009; Galliani et al. 2015): each pixel of one colour tries the planes of
-// the better of two pixels of the other colour at each of four distances, then random changes of its best. Place: for each colour, several times a photo.
-// Work: one thread a pixel of the colour. Shared memory: none. Reads greys, sources, planes of the other colour;
-// writes planes of its own.
+// PatchMatch on a chessboard (Barnes et al. 2009; Galliani et al. 2015): each pixel of one colour tries the planes of
+// the better of two pixels of the other colour at each of four distances, and then random changes of its best plane.
+// Place: several times for each photo, for each colour.
+// Work: one thread per pixel of the colour. Shared memory: none. Reads greys, sources and the planes of the other
+// colour; writes those of its own.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Turns a blended frame into 8-bit pixels for a window: the picture, or a heat map of error,
-// depth or work. A frame that had no room for its intersections leaves the picture before it, scaled to its size: the
-// host does it again, and knows so only some frames later. Place: after blend, in the viewer alone.
-// Work: one thread a pixel. Shared memory: none. Reads the frame with its status, the photo, the picture
-// before, and for VIEW_COUNT where each pixel ended in its tile's list; writes B8G8R8A8.
+// Turns a blended frame into 8-bit pixels for a window: the picture, or a heat map of error, depth or work. A frame
+// that had no room for its intersections shows the previous picture, scaled to its size, because the host learns of it
+// and repeats it only some frames later.
+// Place: after blend, only in the viewer.
+// Work: one thread per pixel. Shared memory: none. Reads the frame with its status, the photo, the previous picture
+// and, for VIEW_COUNT, where each pixel ended in its tile's list; writes B8G8R8A8.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Writes one strip of pictures side by side: a picture, or its difference to another one as heat. Place: after the
-// pictures were drawn, in the viewer. Work: one thread a pixel of the strip. Shared memory: none. Reads two pictures,
-// B8G8R8A8, alpha 0 where a picture has nothing (a photo's camera sees less than the window); writes B8G8R8A8.
+// Writes one strip of pictures side by side: a picture, or its difference from another one as heat.
+// Place: after the pictures were drawn, in the viewer.
+// Work: one thread per pixel of the strip. Shared memory: none. Reads two pictures, B8G8R8A8, with alpha 0 where a
+// picture has nothing (a photo's camera sees less than the window); writes B8G8R8A8.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,7 +20,7 @@ layout(set = 0, binding = 2, scalar) writeonly buffer Pixels { uint pixels[]; };
 #include "lib/linear_id.glsl"
 #include "view/heat.glsl"
 
-// Share of a picture's light shown where there is no photo or error to show: it must not be taken for one.
+// The share of a picture's light where there is no photo or error to show; it must not be mistaken for one.
 const float BESIDE = 0.35;
 
 void main() {

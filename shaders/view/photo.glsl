@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The photo in a frame. The including shader has the DisplayArgs `args` and the buffer `photo`.
 
-// The photo at the frame's pixel, over the background; false outside of it.
+// The photo at the frame's pixel, over the background; false outside the photo.
 bool photo_at(vec2 pixel, vec3 background, out vec3 colour) {
     const vec2 at = (pixel - vec2(args.photo_x, args.photo_y)) / args.photo_scale;
     colour = background;

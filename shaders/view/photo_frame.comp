@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The photo of a camera where it lies in a frame, as 8-bit pixels; alpha 0 outside of it. Place: beside the
-// pictures of kernels in the viewer. Work: one thread a pixel. Shared memory: none. Reads the photo, writes B8G8R8A8.
+// The photo of a camera where it lies in a frame, as 8-bit pixels, with alpha 0 outside it.
+// Place: beside the pictures of kernels in the viewer.
+// Work: one thread per pixel. Shared memory: none. Reads the photo, writes B8G8R8A8.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

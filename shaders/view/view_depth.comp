@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Replaces the colour of every projected splat by its depth, so that the blend that follows gives the mean depth of
-// a pixel as the ratio of its first two channels. Place: between tile ranges and blend, in the viewer alone.
-// Work: one thread a splat; the values of splats that are not visible are not read later. Shared memory: none.
+// Replaces the colour of every projected splat by its depth, so that the blend that follows gives the mean depth of a
+// pixel as the ratio of its first two channels.
+// Place: between tile ranges and blend, only in the viewer.
+// Work: one thread per splat; later passes do not read the values of splats that are not visible. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -109,7 +109,7 @@ TEST_F(WindowTest, A_scene_that_is_not_there_is_an_error_without_a_window) {
     program_.emplace(command(missing, {}), folder_ / "missing.log");
     ASSERT_TRUE(eventually([&] { return !program_->running(); }));
     EXPECT_EQ(program_->wait(), 2);
-    EXPECT_NE(log("missing.log").find("none.ply: is not there\n  Name a splat file"),
+    EXPECT_NE(log("missing.log").find("none.ply: does not exist\n  Name a splat file"),
               std::string::npos)
         << log("missing.log");
 }

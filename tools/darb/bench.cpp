@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // darb bench [FILTER]: how long frames, training steps, sorts and starts take on this device, what
-// they work on, and how near that is to what the device can do.
+// data they move, and how near that is to what the device can do.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -30,12 +30,13 @@
 
 namespace darb {
 
-/// what: a scene of one's own, measured with the photos of `dataset` where one is named; else a
-/// regular expression on the names of the cases, "": all. Throws Error where nothing fits.
+/// what: a scene of one's own, measured with the photos of `dataset` where one is named; otherwise
+/// a regular expression for the names of the cases, where "" means all. Throws Error where nothing
+/// fits.
 std::vector<BenchCase> chosen_cases(const std::string& what, const std::filesystem::path& dataset,
                                     bool full);
 
-/// Those whose scenes are there; a line on stderr for each of the others.
+/// The cases whose scenes exist; each of the others gets a line on stderr.
 std::vector<BenchCase> possible_cases(std::vector<BenchCase> cases, const BenchOptions& options);
 
 // darb bench --growth.
@@ -46,11 +47,11 @@ struct GrowthFlags {
     std::filesystem::path html;
 };
 
-/// Adds --growth and what goes with it.
+/// Adds --growth and the options that belong to it.
 void add_growth_flags(CLI::App& command, GrowthFlags& flags);
 
-/// Measures, prints the table and writes the files that are named.
-/// Throws Error where the flags contradict each other. filter: of the cases.
+/// Measures, prints the table and writes the files that were named. filter: for the names of the
+/// cases. Throws Error where the flags contradict each other.
 void check_growth(const GrowthFlags& flags, const std::string& filter);
 
 void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,
@@ -60,7 +61,7 @@ void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json
 namespace {
 
 struct BenchFlags {
-    std::string filter, device, note;  // filter: or a scene
+    std::string filter, device, note;  // filter: also the path of a scene
     std::filesystem::path data, json, dataset;
     BenchOptions options;
     GrowthFlags growth;
@@ -77,7 +78,8 @@ void run_cases(Device& device, const DeviceRates& rates, const std::vector<Bench
         tell(stream_beside_json(flags.json, flags.quiet), "{}",
              result_text(result, rates, !flags.brief));
         json["benchmarks"].push_back(result_json(result, rates));
-        if (flags.json != "-") write_json(flags.json, json);  // should a later case end the run
+        // kept even if a later case ends the run
+        if (flags.json != "-") write_json(flags.json, json);
     }
     if (flags.json == "-") write_json(flags.json, json);
 }

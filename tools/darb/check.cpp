@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// darb check: the numerical checks on the user's own device; and a view of a scene as arrays.
+// darb check: the numerical checks on the user's own device, and the arrays of a view of a scene.
 
 #include <fmt/format.h>
 
@@ -97,7 +97,7 @@ int check_command(CheckFlags flags) {
                     "Add --scene, --cameras and --dump.");
     flags.checks.kernel = chosen_kernel(flags.kernel);
     DeviceOptions options = command_device(flags.device);
-    options.keep_pipelines = true;  // most checks walk with the same ones
+    options.keep_pipelines = true;  // most checks use the same ones
     Device device(options);
     settle_tuning(device, flags.tune);
     const DeviceInfo& info = device.info();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The subcommands of darb: each adds itself to the command line and leaves what to run.
+// The subcommands of darb: each adds itself to the command line and leaves the action to run.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,10 +9,10 @@
 
 namespace darb {
 
-/// The chosen subcommand's body; returns the exit code.
+/// The body of the chosen subcommand; returns the exit code.
 using Action = std::function<int()>;
 
-/// `darb train` looks at the words as they were typed, too.
+/// `darb train` also looks at the words as they were typed.
 void add_train(CLI::App& app, Action& action, const std::vector<std::string>& arguments);
 
 #ifdef DARB_HAS_VIEWER
@@ -21,7 +21,7 @@ void add_train(CLI::App& app, Action& action, const std::vector<std::string>& ar
 #define DARB_VIEW_COMMAND(ROW)
 #endif
 
-/// The others: the name, which is that of the file, and the heading of `darb --help`.
+/// The other commands: the name, which is also that of the file, and the heading in `darb --help`.
 #define DARB_COMMANDS(ROW)  \
     ROW(eval, "Scenes")     \
     ROW(render, "Scenes")   \

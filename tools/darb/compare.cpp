@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// darb compare DATASET... -o OUT: kernels side by side, trained or found, as the paper's tables.
+// darb compare DATASET... -o OUT: compares kernels, trained or found, in the paper's tables.
 #include "tools/darb/compare.h"
 
 #include <fmt/format.h>
@@ -45,7 +45,7 @@
 
 namespace darb {
 
-/// A run's failure, unless it was interrupted, and its notes, for people; -q hides the notes.
+/// Prints why a run failed, unless it was interrupted, and its notes; -q hides the notes.
 void say_what_went_wrong(const ComparedRun& run);
 
 /// Measures the runs on one data set.
@@ -56,15 +56,14 @@ class RunMeasurer {
     RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
                 const Dataset& dataset, const TrainRequest& first, const Lpips* lpips);
 
-    // These take runs that came to their end. What fails here becomes a note and leaves the run as
-    // it is.
+    // These take runs that ended normally. An error becomes a note and leaves the run as it is.
 
-    /// Measures all but blending.
+    /// Measures everything but blending.
     void measure(ComparedRun& run);
-    /// Measures each kernel's first run that came to its end: all on one device, as times are
+    /// Measures the first complete run of each kernel, all on one device, because the times are
     /// compared.
     void measure_blending(std::vector<ComparedRun>& runs, const std::vector<View>& held_out) const;
-    /// What is measured, in words: ranks that differ in it would give numbers to some runs alone.
+    /// Describes what is measured. If ranks differed in it, only some runs would get the numbers.
     std::string measurements() const;
 
   private:
@@ -110,7 +109,7 @@ void check_flags(CompareFlags& flags) {
             together({files_of(dataset_path(dataset)), flags.lpips, flags.kernel_files}));
 }
 
-// Paths as the file sees them.
+// Paths as seen from the file.
 nlohmann::json shared_json(Comparison comparison, const std::filesystem::path& file) {
     for (ComparedDataset& dataset : comparison.datasets) {
         dataset.path = name_in_json(file, dataset.path);
@@ -124,7 +123,8 @@ int compare(Ranks& ranks, CompareFlags flags) {
     const std::vector<int> kernels = kernels_of(flags);
     Comparison comparison;
     const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
-    for (const std::string& dataset : flags.datasets) {  // bad options end it before it begins
+    // wrong options end it before anything begins
+    for (const std::string& dataset : flags.datasets) {
         const TrainRequest run = train_request_of(flags, dataset, kernels.front(), 0);
         refuse_without_cameras(run, ranks.count());
         if (effect_in_words(run.effects, "cameras").value_or(false))
@@ -196,7 +196,8 @@ void add_compare(CLI::App& app, Action& action) {
     });
 }
 
-// What the runs of a comparison have in common, as its files say it: no folder of the machine.
+// What the runs of a comparison have in common, as its files put it: without folders of the
+// machine.
 
 namespace fs = std::filesystem;
 
@@ -268,17 +269,17 @@ std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
     return lpips;
 }
 
-// The training runs of a comparison, through the code of `darb train`.
+// The training runs of a comparison, made by the code of `darb train`.
 
 namespace {
 
-/// One data set with what its runs share.
+/// One data set, and what its runs share.
 class Comparer {
   public:
     Comparer(const CompareFlags& flags, const std::string& name, int kernel, const Lpips* lpips)
         : flags_(flags), name_(name) {
         TrainRequest first = train_request_of(flags, name, kernel, 0);
-        std::optional<RunLock> lock;  // while COLMAP writes
+        std::optional<RunLock> lock;  // held while COLMAP writes
         dataset_ = load_training_data(first, lock, {flags.quiet, &stop_on_signals()});
         say_notes(dataset_.notes);
         if (held_out().empty())
@@ -291,7 +292,7 @@ class Comparer {
     std::string fingerprint() const { return dataset_fingerprint(dataset_, photos_); }
     RunMeasurer& measurer() { return *measurer_; }
     std::vector<View> held_out() const { return held_out_views(dataset_.views); }
-    /// This rank's share of all runs, by seed and then kernel, up to the stop.
+    /// This rank's share of all runs, by seed and then by kernel, until the user stops.
     std::vector<ComparedRun> runs(const std::vector<int>& kernels, const Ranks& ranks,
                                   const std::atomic<bool>& stop);
 
@@ -321,7 +322,8 @@ void Comparer::train(TrainJob& job, const std::atomic<bool>& stop) {
     say_note(title);
     const RunLock lock(request.output);
     Device device(
-        command_device(flags_.device));  // its own, so that the peak of memory is this run's
+        // one for each run, so that the peak of memory is the run's own
+        command_device(flags_.device));
     settle_tuning(device);
     find_start(device, job, say_stereo_begins);
     darb::run(device, job, {.quiet = flags_.quiet, .stop = &stop});
@@ -394,13 +396,13 @@ ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset
     return result;
 }
 
-// The command line of `darb compare`, and that of each of its runs.
+// The command line of `darb compare`, and the one that each of its runs gets.
 
 namespace fs = std::filesystem;
 
 namespace {
 
-/// An option that goes to `darb train` as it is.
+/// An option that is passed on to `darb train` as it is.
 void forward(CLI::App& command, CompareFlags& flags, const std::string& names,
              const std::string& word, const std::string& help) {
     command.add_option_function<std::string>(
@@ -519,7 +521,7 @@ RunMeasurer::RunMeasurer(const CompareFlags& flags, const std::filesystem::path&
     for (const double scale : flags.scales)
         scaled_.push_back(scaled_views(held_out_views(dataset.views), scale));
     options_.background = glm::vec3(first.train.white_background ? 1.0f : 0.0f);
-    options_.effects = parse_effects(first.effects);  // as it trains, so it is measured
+    options_.effects = parse_effects(first.effects);  // measured with the effects of the training
     options_.alpha_is_mask = dataset.alpha_is_mask;
 }
 

@@ -23,7 +23,7 @@ struct CompareFlags {
     std::vector<std::filesystem::path> kernel_files;
     std::vector<int> iterations{7'000, 30'000};
     std::vector<int> pulses{1};
-    std::vector<double> scales;  // sizes to measure at, beside that of training
+    std::vector<double> scales;  // sizes to measure at, besides that of training
     int seeds = 1;
     std::uint32_t max_splats = 0;        // 0: as many as the threshold makes
     std::vector<std::string> forwarded;  // options of `darb train`, as words
@@ -32,46 +32,46 @@ struct CompareFlags {
     int blending_views = 4;
 };
 
-/// The kernels of --kernels, each with those of --pulses that it has; in that order. Throws Error
-/// where that leaves none.
+/// The kernels of --kernels, each with the variants of --pulses that it has, in that order. Throws
+/// Error where none is left.
 std::vector<int> kernels_of(const CompareFlags& flags);
 
-/// Adds every option to the subcommand; values land in flags, which must outlive the parse.
+/// Adds every option to the subcommand. The values go to flags, which must outlive the parse.
 void add_compare_flags(CLI::App& command, CompareFlags& flags);
 
-/// "PATH@IMAGES" names the photo folder of one data set; what has no such part keeps --images.
+/// "PATH@IMAGES" names the photo folder of one data set; a name without that part keeps --images.
 std::string dataset_path(const std::string& dataset);
 
-/// The last folder of the path as it is given: a link keeps its name.
+/// The last folder of the path as it was given, so that a link keeps its name.
 std::string dataset_name(const std::string& dataset);
 
-/// The options that `darb train` would have for this run. Throws Error for --train-options that it
-/// does not know.
+/// The options that `darb train` would have for this run. Throws Error for unknown --train-options.
 TrainRequest train_request_of(const CompareFlags& flags, const std::string& dataset, int kernel,
                               std::uint64_t seed);
 
-/// Files and folders that the options of the runs name.
+/// The files and folders named by the options of the runs.
 std::vector<std::filesystem::path> paths_in_options(const CompareFlags& flags);
 
-/// What the runs have in common, as sentences; paths in them as seen from the output.
+/// What the runs have in common, as sentences, with paths as seen from the output.
 std::string settings_of(const CompareFlags& flags);
 
-/// What runs say names their data set, the output and files of their options, and no folder around
-/// these.
+/// Shortens the paths in what the runs say: the data set, the output and the files of options keep
+/// their names, without the folders around them.
 void leave_folders_out(ComparedDataset& dataset, const CompareFlags& flags);
 
 /// Throws Error where ranks have other photos or options, or would measure other things.
-/// fingerprint: of the data set, empty where it cannot be read. All ranks call it.
+/// fingerprint: that of the data set, empty where it cannot be read. All ranks must call this.
 void check_same_runs(Ranks& ranks, const CompareFlags& flags, const std::string& dataset,
                      const std::vector<int>& kernels, const std::string& fingerprint,
                      const std::string& measurements);
 
-/// The metric for --lpips; note: which one it is, or why there is none.
+/// The metric for --lpips. note: which one it is, or why there is none.
 std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note);
 
-/// Trains what is not there yet and reads and measures everything, one data set; ends early, with
-/// what there is, when *stop is set. lpips may be null. Several ranks train and measure a share of
-/// the runs each, into the same folders; all get them all, the first with blending.
+/// Trains what is missing, then reads and measures everything, for one data set. It ends early with
+/// what there is when *stop is set. lpips may be null. Several ranks train and measure a share of
+/// the runs each, into the same folders. All ranks get all results, and the first also the
+/// blending.
 ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset,
                            const std::vector<int>& kernels, const Lpips* lpips, Ranks& ranks,
                            const std::atomic<bool>& stop);

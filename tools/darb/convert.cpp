@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// darb convert IN OUT: another format, frame, kernel, degree or part of a scene, or of several.
+// darb convert IN OUT: writes a scene, or several, in another format, frame, kernel or degree, or a
+// part of it.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -31,38 +32,38 @@
 
 namespace darb {
 
-/// Made in this order: up, rotate, scale, translate, crop, prune_opacity, max_sh.
+/// Applied in this order: up, rotate, scale, translate, crop, prune_opacity, max_sh.
 struct SceneEdits {
-    std::string up = "-y";                // axis of the scene that is turned to -y
-    std::string rotate, translate, crop;  // numbers with commas; empty: nothing
+    std::string up = "-y";                // the axis of the scene that is turned to -y
+    std::string rotate, translate, crop;  // numbers with commas; empty: no change
     double scale = 1, prune_opacity = 0;
     int max_sh = 3;
 };
 
 void add_edit_options(CLI::App& app, SceneEdits& edits);
 
-/// Prints to `say` how many splats go. Throws Error naming the option that cannot be read.
+/// Prints to `say` how many splats are dropped. Throws an Error that names an unreadable option.
 void edit_scene(const SceneEdits& edits, SplatModel& model, std::FILE* say);
-/// Cameras of the scene as it was see the same of the edited one: up, rotate, scale, translate.
+/// Moves the cameras so that they see the edited scene as before: up, rotate, scale, translate.
 void edit_views(const SceneEdits& edits, std::vector<View>& views);
-/// Where an axis of the scene as it was, named as --up takes it, points in the edited one. Unit.
+/// Where an axis of the original scene, named as for --up, points in the edited one. Unit vector.
 glm::dvec3 edited_axis(const SceneEdits& edits, const std::string& axis);
 
-/// The splats of all, in order, in the world frame of their files. Harmonics have the highest
-/// degree of them, with zeros where a scene has fewer. Positions are counted from the origin of the
-/// first; where float32 cannot keep another scene's positions that way, all are counted anew, and a
-/// note says by how much they are rounded. names: of the files, in errors and notes. Throws Error
-/// where kernels, footprints or render modes differ.
+/// The splats of all scenes, in order, in the world frame of their files. Harmonics get the highest
+/// degree among them, with zeros where a scene has fewer. Positions are counted from the origin of
+/// the first scene. Where float32 cannot hold another scene's positions that way, all are counted
+/// anew, and a note says by how much they are rounded. names: of the files, for errors and notes.
+/// Throws Error where kernels, footprints or render modes differ.
 SplatModel join_scenes(std::vector<SplatModel> scenes,
                        const std::vector<std::filesystem::path>& names);
 
-// The device that makes SOG's palettes of harmonics, opened at the first of them; the host makes
-// them where there is no device.
+// The device that makes SOG's palettes of harmonics. It is opened when the first one is needed; the
+// host makes them where there is no device.
 
 class PaletteDevice {
   public:
     explicit PaletteDevice(std::string select) : select_(std::move(select)) {}
-    /// For EncodeOptions, which this object must outlive.
+    /// The function for EncodeOptions, which this object must outlive.
     AssignRows assign_rows();
 
   private:
@@ -78,17 +79,17 @@ namespace {
 
 struct OutputChoices {
     EncodeOptions encode;
-    std::uint64_t max_bytes = 0;  // 0: as it comes
+    std::uint64_t max_bytes = 0;  // 0: no limit
     bool measure = true;
     std::string device;
 };
 
-/// The device that pictures are made on, opened at the first of them.
+/// The device that makes pictures. It is opened when the first one is needed.
 class PictureDevice {
   public:
     explicit PictureDevice(const OutputChoices& choices) : choices_(choices) {}
-    /// null where there is none, or none is wanted; says so once. One that --device names and that
-    /// is not there is an Error.
+    /// Null where there is no device or none is wanted, which is reported once. An Error where
+    /// --device names one that does not exist.
     Device* get();
 
   private:
@@ -101,7 +102,7 @@ struct WrittenScene {
     EncodedSplats encoded;
     PictureFit fit;
     std::size_t splats = 0;
-    int levels = 1;  // levels that fit.level was chosen from
+    int levels = 1;  // the number of levels from which fit.level was chosen
 };
 
 class SceneOutput : public PictureOutput {
@@ -152,16 +153,16 @@ Device* PictureDevice::get() {
     return device_ ? &*device_ : nullptr;
 }
 
-/// What every scene that a command writes has in common.
+/// What all scenes that a command writes have in common.
 struct SceneWriter {
     SplatFormat format;
-    const std::vector<View>& views;  // views to measure on
+    const std::vector<View>& views;  // the views for measuring
     PictureDevice& device;
     const WrittenFiles& files;
     const Paths& inputs;
 };
 
-/// Says what of the scene is lost, chooses, checks and writes. Throws Error.
+/// Reports what the format loses of the scene, then chooses, checks and writes. Throws Error.
 WrittenScene write_scene(const std::filesystem::path& output, SplatModel& model,
                          const OutputChoices& choices, const SceneWriter& writer) {
     const SplatFormat format = writer.format;
@@ -217,7 +218,7 @@ void print_loss(std::FILE* say, const std::filesystem::path& output, const Writt
 }
 
 struct ConvertFlags {
-    Paths files;  // inputs and, without -o, the output
+    Paths files;  // the inputs and, without -o, the output
     std::filesystem::path output, cameras;
     std::string kernel;
     SceneEdits edits;
@@ -228,7 +229,7 @@ struct ConvertFlags {
     StoredUnits units;
 };
 
-/// Without -o the last of two names is the output.
+/// Without -o, the last of the names is the output.
 void sort_names(ConvertFlags& flags) {
     if (flags.output.empty()) {
         if (flags.files.size() < 2)
@@ -264,8 +265,8 @@ SplatFormat checked_format(const ConvertFlags& flags) {
     return format.value_or(SplatFormat::ply);
 }
 
-/// The cameras that are named, or some of those that the run left beside the scene, turned with it;
-/// eight around it where there are none.
+/// The cameras that are named, or some of those that the run left beside the scene, turned with it,
+/// or else eight around the scene.
 std::vector<View> views_for(const SplatModel& scene, const ConvertFlags& flags) {
     constexpr std::size_t kOfRun = 8;
     std::vector<View> views;
@@ -304,7 +305,7 @@ void turn_to_gaussians(SplatModel& model, const ConvertFlags& flags, PictureDevi
     model = gaussians;
 }
 
-/// stated_up: as the file of a single scene says it; else empty.
+/// stated_up: what the file of a single scene says; otherwise empty.
 SplatModel load_all(const ConvertFlags& flags, PictureDevice& device, std::FILE* say,
                     std::string& stated_up) {
     std::vector<SplatModel> scenes;
@@ -318,8 +319,8 @@ SplatModel load_all(const ConvertFlags& flags, PictureDevice& device, std::FILE*
     return scenes.size() == 1 ? std::move(scenes[0]) : join_scenes(std::move(scenes), flags.files);
 }
 
-/// The cameras that are named, else all that the run left beside the scene, as in the pages of
-/// darb train and of the viewer; turned with the scene. They say what it is looked at for.
+/// The cameras that are named, else all that the run left beside the scene, turned with it, as in
+/// the pages of darb train and of the viewer. They tell what the scene is about.
 std::vector<View> bookmarks_for(const ConvertFlags& flags) {
     std::vector<View> views = named_views(flags.cameras);
     if (flags.cameras.empty() && flags.files.size() == 1) {
@@ -350,7 +351,7 @@ int convert_to_page(const SplatModel& model, const ConvertFlags& flags,
     return 0;
 }
 
-/// One file, or those of a folder.
+/// Writes one file, or the files of a folder.
 int convert_to_scene(SplatModel& model, SplatFormat format, const ConvertFlags& flags,
                      const Paths& inputs, const WrittenFiles& files, PictureDevice& device,
                      std::FILE* say) {
@@ -388,7 +389,7 @@ int convert_to_scene(SplatModel& model, SplatFormat format, const ConvertFlags& 
 int convert(ConvertFlags flags) {
     sort_names(flags);
     check_level_options(flags.levels);
-    Paths sources;  // files that decide whose an output is
+    Paths sources;  // the files that decide whether an output is darb's to replace
     for (const std::filesystem::path& file : flags.files) sources.push_back(file);
     Paths inputs = together({files_of(flags.cameras), files_of(flags.levels.refine)});
     for (const std::filesystem::path& file : flags.files)
@@ -397,7 +398,7 @@ int convert(ConvertFlags flags) {
     const SplatFormat format = checked_format(flags);
     const WrittenFiles files(sources, flags.force);
     const bool several = flags.levels.levels > 0 && format != SplatFormat::streamed_sog;
-    Paths first{flags.output};  // what is known to be written
+    Paths first{flags.output};  // the outputs that are known already
     if (several) first.clear();
     for (int level = 1; several && level <= flags.levels.levels; ++level)
         first.push_back(level_file(flags.output, format, level));
@@ -461,7 +462,7 @@ void add_convert(CLI::App& app, Action& action) {
 
 namespace {
 
-/// "1,2,3" with exactly that many numbers.
+/// Reads "1,2,3" with exactly that many numbers.
 std::vector<double> numbers(const std::string& option, const std::string& text, size_t count) {
     std::vector<double> values;
     const char *at = text.data(), *end = at + text.size();
@@ -483,7 +484,7 @@ glm::dvec3 vector_of(const std::string& option, const std::string& text) {
     return {v[0], v[1], v[2]};
 }
 
-/// up, then rotate, then scale, then translate.
+/// The similarity of up, then rotate, then scale, then translate.
 Similarity similarity_of(const SceneEdits& edits) {
     Similarity similarity;
     similarity.scale = edits.scale;
@@ -495,7 +496,7 @@ Similarity similarity_of(const SceneEdits& edits) {
     return similarity;
 }
 
-// Whoever leaves out everything meant something else.
+// A user who drops everything meant something else.
 void report_dropped(std::FILE* say, const std::string& option, size_t count, size_t left) {
     if (count > 0 && left == 0)
         throw Error(option, fmt::format("keeps none of {} splats", count),
@@ -526,7 +527,8 @@ void edit_scene(const SceneEdits& edits, SplatModel& model, std::FILE* say) {
 void edit_views(const SceneEdits& edits, std::vector<View>& views) {
     const Similarity similarity = similarity_of(edits);
     for (View& view : views) {
-        Camera& camera = view.camera;  // distances grow with the scene: pictures stay the same
+        // distances grow with the scene, so that pictures stay the same
+        Camera& camera = view.camera;
         camera.rotation = camera.rotation * glm::transpose(similarity.turn);
         camera.translation =
             similarity.scale * camera.translation - camera.rotation * similarity.translation;
@@ -556,7 +558,7 @@ void check_alike(const SplatModel& first, const SplatModel& other, const std::st
             "Merge scenes that were trained with the same render mode.");
 }
 
-/// The scene with harmonics of this degree, zeros above its own.
+/// Gives the scene harmonics of this degree, with zeros above its own.
 void raise_degree(int degree, SplatModel& model) {
     const auto from = static_cast<std::size_t>(model.rest_count());
     const std::size_t count = model.size();
@@ -576,7 +578,7 @@ void append_positions(const SplatModel& model, std::vector<double>& to) {
     }
 }
 
-/// The largest distance on an axis between these positions and those of the model.
+/// The largest distance along an axis between these positions and those of the model.
 double most_rounded(const std::vector<double>& positions, const SplatModel& model) {
     double most = 0;
     for (std::size_t i = 0; i < model.size(); ++i)
@@ -653,7 +655,7 @@ void PaletteDevice::open() {
         device_ = std::make_unique<Device>(command_device(select_));
         clusters_ = std::make_unique<DeviceClusters>(*device_);
     } catch (const Error&) {
-        if (!select_.empty()) throw;  // the host does without a device that nobody asked for
+        if (!select_.empty()) throw;  // where nobody asked for a device, the host does the work
     }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// darb cost SCENE.ply [DATASET]: what each accuracy setting costs in time and buys in accuracy.
+// darb cost SCENE.ply [DATASET]: the time that each accuracy setting costs and the accuracy that it
+// gains.
 #include <fmt/format.h>
 #include <unistd.h>
 #include <filesystem>
@@ -35,17 +36,17 @@ struct CostFlags {
     bool quick = false, full = false, quiet = false, white_background = false;
     DatasetOptions data;
     TuneFlags tune;
-    KernelFlags kernel;  // in place of the scene's
+    KernelFlags kernel;  // replaces the scene's
     std::string size = "640x480";
     StoredUnits units;  // how the scene's file stores its values
 };
 
-/// darb cost --train DATASET
+/// Runs darb cost --train DATASET.
 int train_cost(Ranks& ranks, const CostFlags& flags);
 
 namespace {
 
-// What a run takes its time for: quick about a tenth of the default, full about ten times.
+// How much work a run does: quick about a tenth of the default, full about ten times as much.
 struct Extent {
     CostPlan plan;
     size_t views = 8;

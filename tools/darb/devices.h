@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What `darb devices` prints: every Vulkan device with its limits, which is chosen, and why; and
-// what commands want of the chosen one.
+// What `darb devices` prints: every Vulkan device with its limits, which one is chosen, and why;
+// and what commands need of the chosen one.
 #pragma once
 
 #include <cstdio>
@@ -10,12 +10,12 @@ namespace darb {
 
 class Device;
 
-/// All devices, best first, the one that select (as --device) means marked with a star.
-/// Nothing is printed where out is null. Throws Error as Device does where select means no usable
+/// Prints all devices, best first, with a star at the one that `select` means (as for --device).
+/// Nothing is printed where out is null. Throws Error as Device does where `select` means no usable
 /// device.
 void print_devices(std::FILE* out, const std::string& select = {});
 
-/// Throws Error where the device cannot tell what a pass takes.
+/// Throws Error where the device cannot measure how long a pass takes.
 void require_timestamps(const Device& device);
 
 }  // namespace darb

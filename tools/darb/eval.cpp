@@ -31,7 +31,7 @@
 
 namespace darb {
 
-constexpr std::uint32_t kFewViews = 3;  // fewer are few
+constexpr std::uint32_t kFewViews = 3;  // fewer views than this count as few
 
 struct LightOfView {
     std::string name;
@@ -39,25 +39,27 @@ struct LightOfView {
 };
 
 struct LightReport {
-    std::size_t few = 0, splats = 0;  // few: of the splats, those that few training views see
+    std::size_t few = 0, splats = 0;  // few: how many of the splats few training views see
     std::vector<LightOfView> views;
-    std::optional<double> mean, arc, off_path;  // arc: where other views are there, mean is of them
+    // arc: only where there are views off it; mean is then theirs
+    std::optional<double> mean, arc, off_path;
 };
 
-/// all: of the data set; those that are not held out see the splats. views: to measure, as are
-/// off_path, which may be empty. At the size that the views have, with the default accuracy.
+/// all: the whole data set, whose views that are not held out are those that see the splats. views:
+/// those to measure, as are off_path, which may be empty. Measures at the views' size with the
+/// default accuracy.
 LightReport measure_light(Device& device, const SplatModel& model, const EffectChoice& effects,
                           const std::vector<View>& all, const std::vector<View>& views,
                           const std::vector<View>& off_path);
 
-/// Prints it; returns the same as JSON.
+/// Prints the report and returns it as JSON.
 nlohmann::json told_light(std::FILE* out, const LightReport& light);
 
-// The cameras that a run ended with, where it refined them.
+// The cameras with which a run ended, where it refined them.
 
-/// Takes the cameras of the same names from the cameras.json of the scene's run, at these views'
-/// sizes, and says so in a note. Does nothing where the run refined none. Throws Error where the
-/// file is not what a run leaves.
+/// Takes the cameras of the same names from the cameras.json of the scene's run, at the sizes of
+/// these views, and says so in a note. Does nothing where the run refined none. Throws Error where
+/// the file is not one that a run leaves.
 void take_trained_cameras(const std::filesystem::path& scene, std::vector<View>& views);
 
 namespace {
@@ -66,7 +68,7 @@ struct EvalFlags {
     std::filesystem::path scene, dataset, json;
     std::string split = "test", device, effects = "auto";
     bool eval_exposure = false, quiet = false, light = false, align = false, white = false;
-    std::vector<double> scales;  // none: as the photos are
+    std::vector<double> scales;  // empty: the size of the photos
     StoredUnits units;
     DatasetOptions data;
     AccuracyFlags accuracy;
@@ -109,7 +111,8 @@ int eval(Ranks& ranks, EvalFlags flags) {
     say_notes(away.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(away.views));
     const std::vector<View> beyond = held_out_views(away.views);
-    std::vector<std::vector<View>> sizes;  // before the first picture: a photo may be too small
+    // made before the first picture, because a photo may be too small
+    std::vector<std::vector<View>> sizes;
     for (const double scale : flags.scales) sizes.push_back(scaled_views(views, scale));
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
@@ -153,7 +156,7 @@ double size_to_measure_at(const std::string& word) {
     return size;
 }
 
-// Sizes to measure at and, as in other commands, what stands in the place of scales.
+// Adds the sizes to measure at; their name --scales also has another meaning, as in other commands.
 void add_scales_or_units(CLI::App& command, std::vector<double>& scales, StoredUnits& units) {
     command
         .add_option_function<std::vector<std::string>>(

@@ -130,7 +130,7 @@ Dataset off_path_of(const std::filesystem::path& dataset, const DatasetOptions& 
     const std::filesystem::path folder = dataset / "off_path";
     if (!std::filesystem::exists(folder / "transforms_test.json")) return {};
     DatasetOptions own = options;
-    own.images_folder = DatasetOptions{}.images_folder;  // --images is of the data set's photos
+    own.images_folder = DatasetOptions{}.images_folder;  // --images is about the data set's photos
     own.held_out = {};
     return load_dataset(folder, own);
 }
@@ -216,7 +216,7 @@ PixelSize parse_size(const std::string& text) {
 
 namespace {
 
-// Whether all of it is a number that float32 holds as infinity.
+// Whether the whole text is a number that becomes infinity in float32.
 bool beyond_float(const std::string& value) {
     char* end = nullptr;
     const double number = std::strtod(value.c_str(), &end);
@@ -238,13 +238,14 @@ void refuse_empty_values(const std::vector<std::string>& arguments) {
 
 namespace {
 
-// What CLI11 itself makes a number of; options that are text to it read their numbers on their own.
+// Whether CLI11 itself parses the option as a number; options that are text to it parse their own
+// numbers.
 bool is_number(const CLI::Option& option) {
     const std::string type = option.get_type_name();
     return type.starts_with("FLOAT") || type.starts_with("INT") || type.starts_with("UINT");
 }
 
-// A check that a number is above 0, or 0 where zero says so.
+// Checks that a number is above 0, or with `zero` at least 0.
 CLI::Validator number_from(bool zero, const std::string& name) {
     return CLI::Validator(
         [zero](const std::string& given) {

@@ -16,7 +16,7 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kNames = 30;  // columns of the options' names
+constexpr std::size_t kNames = 30;  // columns for the names of options
 
 std::size_t terminal_width() {
     winsize size{};
@@ -28,7 +28,8 @@ std::size_t terminal_width() {
     return static_cast<std::size_t>(std::clamp(columns, 60L, 100L));
 }
 
-/// Words into lines; those after the first are indented. at: the column where the text begins.
+/// Breaks words into lines, of which all but the first are indented. at: the column where the text
+/// begins.
 std::string wrapped(const std::string& text, std::size_t at, std::size_t indent) {
     const std::size_t width = terminal_width();
     std::istringstream words(text);
@@ -77,7 +78,7 @@ class HelpFormatter : public CLI::Formatter {
         std::size_t left_out = 0;
         std::vector<std::string> groups = app->get_groups();
         std::stable_sort(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
-            return is_for_few(a) < is_for_few(b);  // those of many users first
+            return is_for_few(a) < is_for_few(b);  // options for many users come first
         });
         for (const std::string& group : groups) {
             const auto options = app->get_options(
@@ -140,11 +141,11 @@ std::shared_ptr<CLI::Formatter> make_help_formatter() {
     return std::make_shared<HelpFormatter>();
 }
 
-// What the commands say to a command line that they do not take.
+// What darb answers to a command line that it does not accept.
 
 namespace {
 
-// Letters to change, add or take away (Levenshtein).
+// How many letters to change, add or remove (Levenshtein).
 std::size_t distance(const std::string& a, const std::string& b) {
     std::vector<std::size_t> row(b.size() + 1);
     for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -212,7 +213,7 @@ Error usage_error(const CLI::App& app, const CLI::ParseError& error) {
 
 namespace {
 
-// "TEXT:{psi,exact}", as CLI11 describes a value that must be one of some.
+// Reads "TEXT:{psi,exact}", as CLI11 describes a value that must be one of several.
 nlohmann::json choices_of(const CLI::Option& option) {
     nlohmann::json choices = nlohmann::json::array();
     const std::string type = option.get_type_name();
@@ -239,7 +240,7 @@ nlohmann::json option_json(const CLI::Option& option) {
 
 nlohmann::json options_of(const CLI::App& app) {
     nlohmann::json options = nlohmann::json::array();
-    for (const bool few : {false, true})  // those of many users first
+    for (const bool few : {false, true})  // options for many users come first
         for (const CLI::Option* option : app.get_options())
             if (!option->get_group().empty() && is_for_few(option->get_group()) == few)
                 options.push_back(option_json(*option));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// darb info X: what a splat scene, or a data set, holds.
+// darb info X: what a splat scene or a data set holds.
 #include <fmt/format.h>
 #include <algorithm>
 #include <array>
@@ -32,25 +32,25 @@
 
 namespace darb {
 
-/// info: of scene_info.
+/// info: from scene_info.
 void print_scene_info(const nlohmann::json& info);
-/// info: of dataset_info.
+/// info: from dataset_info.
 void print_dataset_info(const nlohmann::json& info);
 
-// What `darb info` says of photos with cameras.
+// What `darb info` says about photos with cameras.
 
-/// Opens a data set (heads of the photos only) or a cameras.json. Keys: path, source, views, train,
-/// test (as the source splits them), sizes [{width, height, views}] (px, as training takes them),
-/// lenses [{model, width, height, views}] (as declared), points, extent (world units), has_alpha,
-/// notes. Throws Error as load_dataset does.
+/// Opens a data set (only the headers of the photos) or a cameras.json. Keys: path, source, views,
+/// train, test (as the source splits them), sizes [{width, height, views}] (px, as training takes
+/// them), lenses [{model, width, height, views}] (as declared), points, extent (world units),
+/// has_alpha, notes. Throws Error as load_dataset does.
 nlohmann::json dataset_info(const std::filesystem::path& path, const DatasetOptions& options);
 
-// What `darb info` says of a splat scene.
+// What `darb info` says about a splat scene.
 
 /// Reads any splat file. Keys: path, format, version (null where the format has none), details,
 /// bytes, splats, dropped, notes (of the reader), kernel, footprint, render_mode, sh_degree,
 /// origin; bounds and inner_bounds (1st to 99th percentile by axis) {low, high}, world; scale (the
-/// largest standard deviation of a splat, world), opacity and, of a kernel with shapes, exponent
+/// largest standard deviation of a splat, world), opacity and, for a kernel with shapes, exponent
 /// (as drawn) {p1, p10, p50, p90, p99}; zero_rotations, huge, needles, saturated, invisible
 /// (counts); warnings (sentences). Throws Error for other files. O(N).
 nlohmann::json scene_info(const std::filesystem::path& path, const StoredUnits& units = {});
@@ -186,7 +186,7 @@ namespace {
 
 using nlohmann::json;
 
-// A data set, or a camera list as one without photos and points.
+// Opens a data set, or a camera list as a data set without photos and points.
 Dataset open(const std::filesystem::path& path, const DatasetOptions& options) {
     const bool is_file = std::filesystem::is_regular_file(path);
     std::vector<View> views;
@@ -248,7 +248,8 @@ using nlohmann::json;
 // diagonal of the inner bounds, and a needle where its longest axis is so many times the second.
 constexpr double kHugeShare = 0.5;
 constexpr double kNeedleRatio = 100;
-constexpr double kOddShare = 0.01;  // needles and saturated splats below it are not worth a word
+// a smaller share of needles or saturated splats is not mentioned
+constexpr double kOddShare = 0.01;
 constexpr double kSaturatedLogit = 17;  // the sigmoid is 1 in float32, its gradient 0
 
 json percentiles(std::vector<double>& values) {
@@ -259,7 +260,7 @@ json percentiles(std::vector<double>& values) {
     return result;
 }
 
-// World positions of the axis at these shares of the splats.
+// The world positions by axis below which these shares of the splats lie.
 json bounds(const SplatModel& model, double low, double high) {
     json result;
     std::vector<double> values(model.size());
@@ -281,7 +282,7 @@ double diagonal(const json& bounds) {
     return std::sqrt(square);
 }
 
-// Counts of odd splats, and the percentiles of scale and opacity.
+// Adds the counts of odd splats, and the percentiles of scale and opacity.
 void add_splats(const SplatModel& model, json& info) {
     const double huge_scale = kHugeShare * diagonal(info["inner_bounds"]);
     std::vector<double> scales, opacities, exponents;

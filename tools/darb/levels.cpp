@@ -26,16 +26,16 @@
 
 namespace darb {
 
-/// Photos to train on, and those held out to measure with.
+/// Refines levels on photos, and measures them on photos that are held out.
 class Refiner {
   public:
-    /// Loads the data set with its photos; sources without a split of their own hold out every 8th.
+    /// Loads the data set with its photos; where the source has no split, every 8th is held out.
     Refiner(const std::filesystem::path& dataset, const DatasetOptions& options);
 
-    /// The splats after so many iterations on the photos: none are added or removed, rates are
-    /// those of the end of a long run, kernel, footprint, degree and antialias stay.
+    /// The splats after this many iterations on the photos. None are added or removed, the rates
+    /// are those at the end of a long run, and kernel, footprint, degree and antialias stay.
     SplatModel refine(Device& device, const SplatModel& model, int iterations) const;
-    /// Mean over the held-out photos, dB.
+    /// The mean over the held-out photos, dB.
     double psnr_db(Device& device, const SplatModel& model) const;
     const Dataset& dataset() const { return dataset_; }
 
@@ -46,8 +46,8 @@ class Refiner {
 
 namespace {
 
-constexpr double kHalf = 0.5;    // share of a level of the one before
-constexpr int kMostLevels = 20;  // a million times fewer
+constexpr double kHalf = 0.5;    // share of the previous level
+constexpr int kMostLevels = 20;  // a millionth of the splats is left after so many
 
 }  // namespace
 
@@ -147,7 +147,7 @@ void print_table(const std::vector<Row>& rows, std::size_t views, double photos_
     tell(to, "\n");
 }
 
-/// --refine, and how near the photos all splats come.
+/// The refiner of --refine, and how near all splats come to the photos.
 struct Refinement {
     Refinement(const LevelFlags& from, const SplatModel& model, const std::string& select)
         : flags(from), refiner(from.refine, from.data), device(command_device(select)) {
@@ -157,7 +157,7 @@ struct Refinement {
         row.photos_db = refiner.psnr_db(device, level);
         SplatModel refined = refiner.refine(device, level, flags.iterations);
         row.refined_db = refiner.psnr_db(device, refined);
-        if (row.refined_db < row.photos_db) {  // the 3D filter of anti-aliasing comes twice
+        if (row.refined_db < row.photos_db) {  // the 3D filter of anti-aliasing is applied twice
             row.refined_db = row.photos_db;
             return;
         }
@@ -170,7 +170,7 @@ struct Refinement {
     double photos_db = 0;  // PSNR of the whole model on the held-out photos
 };
 
-/// All levels as one scene; rows: one for the model and one for each level.
+/// Writes all levels as one scene. rows: one for the model and one for each level.
 void write_streamed(const SplatModel& model, std::vector<SplatModel> levels, const LevelOutput& to,
                     std::vector<Row>& rows) {
     SplatModel finest = model;
@@ -264,7 +264,7 @@ SceneDifference compare_scenes(const SplatModel& scene, const SplatModel& other,
 
 namespace {
 
-// The rates at which 3DGS ends: the splats are where they belong, and only settle.
+// The rates with which 3DGS ends: the splats are in place and only settle.
 constexpr float kPositionRate = 1.6e-5f, kLastPositionRate = 1.6e-6f;
 
 TrainRequest refine_request(const SplatModel& model, int iterations) {
@@ -277,7 +277,7 @@ TrainRequest refine_request(const SplatModel& model, int iterations) {
     return request;
 }
 
-// After the plan of effects, which is that of a run from points.
+// Applied after the plan of effects, which is that of a run from points.
 void keep_splats_as_they_are(const SplatModel& model, TrainOptions& t) {
     t.antialias = model.antialias;
     t.probe_sh = false;
@@ -329,7 +329,7 @@ double Refiner::psnr_db(Device& device, const SplatModel& model) const {
         const double db =
             compare_view(views[i].name, picture, photos_[i], glm::vec3(0), dataset_.alpha_is_mask)
                 .psnr_db;
-        if (std::isnan(db)) continue;  // all masked
+        if (std::isnan(db)) continue;  // everything is masked
         sum += db;
         ++count;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Fewer splats by merging, for `darb convert`: one file of a count, or several levels, each refined
-// against photos where they are given.
+// Fewer splats by merging, for `darb convert`: one file with a given count, or several levels, each
+// refined against photos where they are given.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -19,9 +19,9 @@
 namespace darb {
 
 struct LevelFlags {
-    std::size_t splats = 0;       // splats of the first level; 0: by share
-    std::optional<double> share;  // share of each level in the one before
-    int levels = 0;               // 0: one file of the output's name
+    std::size_t splats = 0;       // of the first level; 0: by share
+    std::optional<double> share;  // how many splats each level keeps of the previous one
+    int levels = 0;               // 0: one file with the output's name
     std::filesystem::path refine;
     int iterations = 300;
     DatasetOptions data;
@@ -29,18 +29,18 @@ struct LevelFlags {
 };
 
 void add_level_options(CLI::App& app, LevelFlags& flags);
-/// Throws Error for options that say nothing together.
+/// Throws Error for options that contradict each other.
 void check_level_options(const LevelFlags& flags);
 
-/// Splats of the levels, falling, at least 1.
+/// How many splats each level has, falling, at least 1.
 std::vector<std::size_t> level_counts(const LevelFlags& flags, std::size_t splats);
-/// The name of level n, from 1: the number before what the format's name ends in.
+/// The name of level n, from 1: the number stands before the ending of the format.
 std::filesystem::path level_file(const std::filesystem::path& output, SplatFormat format, int n);
 
-/// Merges the scene and writes its levels; prints a row for each: splats, bytes, PSNR against the
+/// Merges the scene and writes its levels. Prints a row for each: splats, bytes, PSNR against the
 /// scene in `views` and, with --refine, against the held-out photos before and after. --levels as
-/// streamed SOG are one scene: the model itself is its finest level. write: the model, and the
-/// coarser levels of streamed SOG, to a file. Returns the names of the files. Throws Error.
+/// streamed SOG make one scene, with the model itself as the finest level. write: writes the model,
+/// and the coarser levels of streamed SOG, to a file. Returns the names of the files. Throws Error.
 struct LevelOutput {
     std::filesystem::path output;
     SplatFormat format = SplatFormat::ply;
@@ -66,7 +66,7 @@ std::string difference_text(const SceneDifference& difference, std::size_t views
 /// Eight views around the splats, 480 x 360. Throws Error where there are none.
 std::vector<View> views_around(const SplatModel& scene);
 
-/// Renders both on the device (select: number or part of a name) over black. Equal pictures count
+/// Renders both over black on the device (select: number or part of a name). Equal pictures count
 /// as 100 dB.
 SceneDifference compare_scenes(const SplatModel& scene, const SplatModel& other,
                                const std::vector<View>& views, const std::string& device);

@@ -26,7 +26,7 @@
 
 namespace darb {
 
-/// The window has a thread and a device of its own; what both threads touch is behind the mutex.
+/// The window has a thread and a device of its own; the mutex guards what both threads use.
 struct LiveView::State {
     State(Device& device, ViewerOptions options, const Dataset& dataset, DeviceOptions of_window,
           const std::atomic<bool>& stop_, const std::atomic<bool>& lost_, bool white_)
@@ -63,18 +63,18 @@ struct LiveView::State {
     std::mutex mutex;
     std::condition_variable changed;
     ViewerWindow* window = nullptr;
-    TrainingCurves training;  // as the run reports it; pause and steps as the user wants them
+    TrainingCurves training;  // what the run reports; pause and steps are the user's
     std::optional<LiveScene> scene;
     std::filesystem::path model;
     int version = 0;  // version of `training`
     bool closed = false, finished = false;
-    std::atomic<bool> leave{false};  // the run failed
+    std::atomic<bool> leave{false};  // set when the run failed
     std::string failure;             // why the window closed by itself
 
     int followed = 0;  // the version that the window's thread shows
     std::chrono::steady_clock::time_point redrawn;
     bool begun = false, ended = false;
-    std::thread thread;  // the last member: it uses all others
+    std::thread thread;  // the last member, because it uses all others
 };
 
 namespace {
@@ -86,15 +86,16 @@ constexpr auto kPausedNap = std::chrono::milliseconds(20);
 }  // namespace
 
 struct LiveSystem::System {
-    std::atomic<bool> lost{false};  // the display; before what it outlives
+    // set when the display is gone; declared before what it must outlive
+    std::atomic<bool> lost{false};
     WindowSystem windows;
-    DeviceOptions device;  // options that windows need
+    DeviceOptions device;  // with what windows need
 };
 
 LiveView::LiveView(std::unique_ptr<State> state) : state_(std::move(state)) {}
 LiveView::~LiveView() = default;
 
-// The run matters more than its window.
+// A failing window must not stop the run.
 void LiveView::warn(const std::string& reason) {
     say("warning: the window is closed: {}; the run goes on\n", reason);
     state_.reset();
@@ -114,7 +115,7 @@ double LiveView::show(const LiveStep& step) {
     try {
         s.drawer.draw(step.splats, change, s.picture);
         paused_s = wait_while_paused(step);
-    } catch (const DeviceLost&) {  // which is the run's, too
+    } catch (const DeviceLost&) {  // the run has lost it, too
         throw;
     } catch (const std::exception& e) {
         failure = e.what();
@@ -130,7 +131,7 @@ double LiveView::show(const LiveStep& step) {
     return paused_s;
 }
 
-// Pictures go on: the user may look around.
+// Pictures go on while paused, because the user may look around.
 double LiveView::wait_while_paused(const LiveStep& step) {
     State& s = *state_;
     const auto start = Clock::now();
@@ -175,8 +176,8 @@ LiveSystem::LiveSystem(bool on, const DeviceOptions& options) {
     survive_display_loss(system_->lost);
 }
 
-// Where the window's thread lost the display, what this one asked of it would be waited for without
-// end: it stays as it is until the process ends.
+// Where the window's thread lost the display, requests of this thread would wait without end, so
+// the window system stays as it is until the process ends.
 LiveSystem::~LiveSystem() {
     if (!system_ || !system_->lost) return;
     static const System* const kept = system_.release();
@@ -245,8 +246,8 @@ void LiveCurves::add(const LiveStep& step, TrainingCurves& t) {
 
 namespace {
 
-constexpr double kNap_s = 0.05;    // pause of the window between two looks at the run
-constexpr double kRedraw_s = 0.2;  // between two redraws for the curves alone
+constexpr double kNap_s = 0.05;    // the window's pause between two looks at the run
+constexpr double kRedraw_s = 0.2;  // time between two redraws for the curves alone
 
 }  // namespace
 
@@ -264,7 +265,7 @@ void LiveView::State::show_window() {
         Device device(window_device);
         viewer_options.second_device = window_device;
         ViewerWindow shown(device, viewer_options, 1280, 720);
-        struct Forget {  // before the window goes, whichever way it does
+        struct Forget {  // runs before the window is destroyed, however that happens
             State& state;
             ~Forget() {
                 const std::lock_guard lock(state.mutex);
@@ -274,7 +275,7 @@ void LiveView::State::show_window() {
         shown.set_title("training - darb");
         Session& session = shown.viewer().session();
         if (!session.photos.views.empty()) shown.viewer().choose_camera(0);
-        session.training.live = true;  // nothing may be opened from now on
+        session.training.live = true;  // from now on nothing may be opened
         if (white) session.display.background = glm::vec3(1.0f);
         {
             const std::lock_guard lock(mutex);
@@ -294,7 +295,7 @@ void LiveView::State::show_window() {
     changed.notify_all();
 }
 
-// What the user wants goes to the run, what it reports to the user.
+// Passes the user's wishes to the run, and the run's reports to the user.
 void LiveView::State::follow_run(ViewerWindow& shown) {
     Viewer& viewer = shown.viewer();
     TrainingCurves& seen = viewer.session().training;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // darb train --view: a window that follows a training run. It has a thread and a device of its own,
-// so no iteration, evaluation or compilation holds it up; the run draws its pictures between two
-// iterations, on its own thread and device.
+// so no iteration, evaluation or compilation holds it up. The run draws the window's pictures
+// between two iterations, on its own thread and device.
 #pragma once
 
 #include <atomic>
@@ -23,9 +23,9 @@ class LiveView {
     explicit LiveView(std::unique_ptr<State> state);
     ~LiveView();
 
-    /// Hands over what is new and, where a picture is due, draws it; blocks while paused and
-    /// returns how long that was, in s. Does nothing once the window is closed; it is, with a
-    /// warning, where it fails: the run goes on.
+    /// Hands over what is new and draws a picture where one is due. It blocks while paused and
+    /// returns how long that was, in s. Once the window is closed it does nothing; where the window
+    /// fails, it is closed with a warning and the run goes on.
     double show(const LiveStep& step);
     /// The run is over: shows its scene until the window is closed.
     void finish(const std::filesystem::path& model);
@@ -36,15 +36,15 @@ class LiveView {
     std::unique_ptr<State> state_;
 };
 
-/// The window system, before the device is made; nothing where on is false. Throws Error where
-/// there is no display, or no viewer in this build.
+/// Starts the window system, which must happen before the device is made; does nothing where `on`
+/// is false. Throws Error where there is no display, or no viewer in this build.
 class LiveSystem {
   public:
-    /// options: of the run's device; the window's is the same.
+    /// options: for the run's device; the window uses the same one.
     LiveSystem(bool on, const DeviceOptions& options);
     ~LiveSystem();
-    /// Null where it is off. stop: set by Ctrl-C, ends a pause. white: what is behind the splats;
-    /// else black.
+    /// Null where it is off. stop: set by Ctrl-C, ends a pause. white: the background is white
+    /// instead of black.
     std::unique_ptr<LiveView> open(Device& device, const Dataset& dataset,
                                    const std::atomic<bool>& stop, bool white) const;
 
@@ -53,17 +53,18 @@ class LiveSystem {
     std::unique_ptr<System> system_;
 };
 
-// What a live view of training draws beside the picture: curves of the run, bounds of its scene.
+// What a live view of training shows besides the picture: curves of the run, bounds of its scene.
 
 struct LiveCurves {
-    /// One step; thins the curves out as they get long.
+    /// Adds one step; thins the curves out as they get long.
     void add(const LiveStep& step, TrainingCurves& curves);
 
     float loss = 0, psnr_db = 0;  // smoothed
-    int stride = 1;               // iterations of one value of a curve
+    int stride = 1;               // iterations for each value of a curve
 };
 
-/// What the cameras look at of the sparse points; the cameras where there are none.
+/// The bounds of the sparse points that the cameras look at, or of the cameras where there are
+/// none.
 Bounds bounds_of(const Dataset& dataset);
 
 }  // namespace darb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// In place of live_view.cpp where the viewer was not built.
+// Replaces live_view.cpp where the viewer was not built.
 #include "engine/core/error.h"
 #include "tools/darb/live_view.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// darb: train, render and measure splat scenes. Exit codes: 0 done, 1 internal error, 2 bad usage
-// or input, or what the system refuses (a full disk); 128 and its number: a signal ended a run that
-// was saved.
+// darb: train, render and measure splat scenes. Exit codes: 0 done; 1 internal error; 2 bad usage
+// or input, or a refusal of the system (a full disk); 128 plus its number where a signal ended a
+// run that was saved.
 
 #include <fmt/format.h>
 
@@ -31,7 +31,7 @@ std::string with_mpi() {
     return name.empty() ? "\nwithout MPI: on one machine alone" : "\nwith " + name;
 }
 
-// 3DGS spells options with underscores; here they are the same as dashes.
+// 3DGS spells options with underscores, which mean the same as dashes here.
 std::vector<std::string> with_dashes(int argc, char** argv) {
     std::vector<std::string> arguments(argv + 1, argv + argc);
     for (std::string& argument : arguments) {
@@ -43,7 +43,8 @@ std::vector<std::string> with_dashes(int argc, char** argv) {
     return arguments;
 }
 
-// A value that begins with a minus reads like an option: "--effects -sh" becomes "--effects=-sh".
+// A value that begins with a minus would be read as an option: "--effects -sh" becomes
+// "--effects=-sh".
 void join_effects(std::vector<std::string>& arguments) {
     for (size_t i = 0; i + 1 < arguments.size(); ++i) {
         const std::string& value = arguments[i + 1];
@@ -64,7 +65,7 @@ void add_commands(CLI::App& app, darb::Action& action, const std::vector<std::st
 #undef DARB_ADD_COMMAND
 }
 
-// Or the version.
+// Shows help, or the version.
 int show_help(const CLI::App& app, const CLI::ParseError& asked) {
     std::ostringstream text;
     const int code = app.exit(asked, text, text);
@@ -103,8 +104,8 @@ int run(int argc, char** argv) {
     return action();
 }
 
-// The error is of the output where the file behind stdout failed, else of a thread that did not
-// start.
+// The error is about the output where the file behind stdout failed, otherwise about a thread that
+// did not start.
 int report(const std::system_error& e) {
     const bool output = std::ferror(stdout) != 0;
     darb::say("error: {}: {}\n  {}\n", output ? "standard output" : "darb", e.code().message(),
@@ -121,7 +122,7 @@ int main(int argc, char** argv) {
     darb::go_on_without_readers();
     try {
         const int code = run(argc, argv);
-        darb::tell_text("");  // what is left in the buffer
+        darb::tell_text("");  // writes what is left in the buffer
         return code;
     } catch (const darb::Error& e) {
         darb::say("error: {}\n", e.what());

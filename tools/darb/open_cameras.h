@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Cameras and data sets as subcommands open them: with what the readers note on stderr.
+// Opens cameras and data sets for subcommands, and prints the readers' notes on stderr.
 #pragma once
 
 #include <filesystem>
@@ -9,11 +9,11 @@
 
 namespace darb {
 
-/// load_cameras, its notes printed.
+/// Calls load_cameras and prints its notes.
 std::vector<View> open_cameras(const std::filesystem::path& path,
                                const DatasetOptions& options = {});
 
-/// The cameras.json that darb train left beside a scene; none where there is none. Throws Error.
+/// The cameras.json that darb train left beside a scene; empty where there is none. Throws Error.
 std::vector<View> cameras_beside(const std::filesystem::path& scene);
 
 }  // namespace darb

@@ -27,7 +27,7 @@ namespace {
 
 using Identity = std::pair<dev_t, ino_t>;
 
-// Whether `path` is a regular file that is there; `identity` then becomes the file's.
+// Whether `path` is an existing regular file; `identity` then becomes that file's.
 bool identify(const fs::path& path, Identity& identity) {
     struct stat facts {};
     if (::stat(path.c_str(), &facts) != 0 || !S_ISREG(facts.st_mode)) return false;
@@ -40,7 +40,7 @@ bool counts(const fs::path& path) {
     return !path.empty() && path != "-" && (fs::is_regular_file(path) || !fs::exists(path, none));
 }
 
-// Whether a folder is read by files of this name.
+// Whether a file of this name describes the folder in which it lies.
 bool describes(const fs::path& path) {
     constexpr std::array names{"meta.json",    "metrics.json",    "cameras.json",
                                "command.json", "exposure.json",   "run.jsonl",
@@ -58,14 +58,14 @@ bool begins_with(const std::vector<std::byte>& bytes, std::string_view text) {
     return bytes.size() >= text.size() && std::memcmp(bytes.data(), text.data(), text.size()) == 0;
 }
 
-// Somebody's work by its first bytes, whatever its name: what it is, or "".
+// Recognises a user's work by its first bytes, whatever its name. Returns what it is, or "".
 std::string_view work_in(const fs::path& path) {
     constexpr std::size_t kHead = 8;
     std::vector<std::byte> head;
     try {
         head = read_file_head(path, kHead);
     } catch (const Error&) {
-        return "";  // whoever writes to it will say why not
+        return "";  // the writer will say why it cannot be written
     }
     if (begins_with(head, "\x89PNG") || begins_with(head, "\xff\xd8\xff")) return "a picture";
     for (const std::string_view scene : {"ply\n", "ply\r", "NGSP", "glTF", "PK\x03\x04"})
@@ -108,7 +108,7 @@ Paths files_of(const fs::path& input) {
         for (const fs::directory_entry& entry : fs::directory_iterator(beside, none)) {
             if (has_extension(entry.path(), ".webp")) files.push_back(entry.path());
             for (const fs::directory_entry& part : fs::directory_iterator(entry.path(), none))
-                files.push_back(part.path());  // part of a streamed scene
+                files.push_back(part.path());  // a part of a streamed scene
         }
     if (has_extension(input, ".gltf"))
         for (const fs::directory_entry& entry :
@@ -134,7 +134,7 @@ Paths outputs_of(const fs::path& output, const EncodedSplats& encoded) {
 }
 
 void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs, Replaces replaces) {
-    std::map<Identity, fs::path> there;  // the outputs that are
+    std::map<Identity, fs::path> there;  // the outputs that exist
     std::map<fs::path, bool> named;
     Identity identity;
     for (const fs::path& output : outputs) {
@@ -161,7 +161,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostWritten = 10'000;  // files that are remembered, the newest
+constexpr std::size_t kMostWritten = 10'000;  // how many files are remembered, the newest ones
 
 std::string whole_name(const fs::path& path) {
     std::error_code none;
@@ -169,7 +169,7 @@ std::string whole_name(const fs::path& path) {
     return (none ? fs::absolute(path, none) : whole).lexically_normal().string();
 }
 
-/// Size and time of the last change: another program's work shows in one of them.
+/// Size and time of the last change; the work of another program shows in one of them.
 bool stamp_of(const fs::path& path, std::int64_t& bytes, std::int64_t& changed_ns) {
     struct stat facts {};
     if (::stat(path.c_str(), &facts) != 0 || !S_ISREG(facts.st_mode)) return false;
@@ -178,7 +178,7 @@ bool stamp_of(const fs::path& path, std::int64_t& bytes, std::int64_t& changed_n
     return true;
 }
 
-/// The list of what was written; empty where there is none or the file is something else.
+/// The list of written files; empty where there is none or the file is something else.
 json read_record(const fs::path& record) {
     std::error_code none;
     if (record.empty() || !fs::is_regular_file(record, none)) return json::array();
@@ -186,7 +186,7 @@ json read_record(const fs::path& record) {
         const json whole = json::parse(read_text_file(record));
         if (whole.is_object() && whole.contains("written") && whole["written"].is_array())
             return whole["written"];
-    } catch (const std::exception&) {  // is rewritten
+    } catch (const std::exception&) {  // the file is rewritten
     }
     return json::array();
 }
@@ -264,7 +264,7 @@ void WrittenFiles::wrote(const Paths& outputs) const {
         write_file_atomic(
             record_,
             json{{"written", kept}}.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
-    } catch (const Error&) {  // the next time darb asks
+    } catch (const Error&) {  // darb asks the next time
     }
 }
 
@@ -294,7 +294,7 @@ std::FILE* stream_beside_json(const std::filesystem::path& json, bool quiet) {
 
 void write_json(const std::filesystem::path& to, const nlohmann::json& json) {
     if (to.empty()) return;
-    const bool shown = to == "-";  // names may hold any bytes, and what steers a terminal
+    const bool shown = to == "-";  // names may hold any bytes, even ones that control a terminal
     const std::string text =
         json.dump(2, ' ', shown, nlohmann::json::error_handler_t::replace) + "\n";
     shown ? tell_text(text) : write_file_atomic(to, text);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The one rule for every file that a command writes: never one that it reads.
+// The one rule for every file that a command writes: it must not be one that the command reads.
 #pragma once
 
 #include <fmt/format.h>
@@ -22,40 +22,41 @@ namespace darb {
 
 using Paths = std::vector<std::filesystem::path>;
 
-/// What a scene, the output folder of a run, a data set or a list of cameras is read from, itself
-/// among them; the photos are those of files_of(views). Names need not be there; an empty path has
-/// none.
+/// The files from which a scene, the output folder of a run, a data set or a list of cameras is
+/// read, including itself. Photos come from files_of(views). The files need not exist; an empty
+/// path has none.
 Paths files_of(const std::filesystem::path& input);
 /// Photos and masks.
 Paths files_of(const std::vector<View>& views);
 
-/// What a scene is written to.
+/// The files to which a scene is written.
 Paths outputs_of(const std::filesystem::path& output, const EncodedSplats& encoded);
 
-/// What a command replaces where it is there.
+/// Which existing files a command replaces.
 enum class Replaces {
-    reports,  // numbers, pages and pictures: never a scene, and a picture only by a picture
-    all       // the caller asks WrittenFiles
+    reports,  // numbers, pages and pictures; never a scene, and a picture only by a picture
+    all       // any; the caller asks WrittenFiles
 };
-/// Throws Error where one of the outputs is one of the inputs, by the file that they come to, links
-/// or not, where two outputs are one file, or where one is there that is not replaced. Empty paths
-/// and "-" do not count. Pipes and devices may be named twice.
+/// Throws Error where one of the outputs is one of the inputs (also through links), where two
+/// outputs are the same file, or where an output exists that may not be replaced. Empty paths and
+/// "-" do not count. Pipes and devices may be named twice.
 void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs, Replaces replaces);
 void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs);  // for reports
 
-/// Which files darb may write over without being told: those that it wrote itself, from the same
-/// scene. A record in the user's state folder says so; docs/formats.md has the rule.
+/// Which files darb may overwrite without being told: those that it wrote itself, from the same
+/// scene. A record in the user's state folder tells; docs/formats.md has the rule.
 class WrittenFiles {
   public:
-    /// sources: what the outputs are made from; none: any, as of frames. force: --force, which
-    /// allows everything.
+    /// sources: the files from which the outputs are made; empty: any, as for frames. force:
+    /// --force, which allows everything.
     WrittenFiles(const Paths& sources, bool force);
 
-    /// Throws Error where one of the outputs is there and would be lost: a folder, or a file with
-    /// content that the record does not know as written from these sources and untouched since.
+    /// Throws Error where one of the outputs exists and would be lost: a folder, or a file with
+    /// content that the record does not know as written from these sources and unchanged since.
     /// Pipes and devices hold nothing; "-" and empty paths do not count.
     void check(const Paths& outputs) const;
-    /// Remembers them. Where there is no state folder, or it cannot be written, nothing is.
+    /// Remembers the outputs. Where there is no state folder, or it cannot be written, nothing is
+    /// remembered.
     void wrote(const Paths& outputs) const;
 
   private:
@@ -66,41 +67,42 @@ class WrittenFiles {
     std::filesystem::path record_;  // empty: there is none
 };
 
-/// -q, the same in every command: paths of what was written, warnings and errors are printed.
+/// -q, the same in every command: only paths of what was written, warnings and errors are printed.
 CLI::Option* add_quiet_flag(CLI::App& command, bool& quiet);
-/// A line with each on stdout where quiet; who is not finds them in the text. Empty paths and "-"
-/// do not count.
+/// With `quiet` prints each path on a line of stdout; otherwise the text for people names them.
+/// Empty paths and "-" do not count.
 void tell_paths(bool quiet, const Paths& written);
 
-/// All of them in one list.
+/// Joins all lists.
 Paths together(std::initializer_list<Paths> lists);
 
-// What --json FILE means in every command that measures: every number in this file; "-" is stdout,
-// and what is for people goes to stderr then.
+// What --json FILE means in every command that measures: the file gets every number. "-" is stdout,
+// and the text for people then goes to stderr.
 
 CLI::Option* add_json_option(CLI::App& command, std::filesystem::path& json);
 
-/// Where text for people goes; null, nowhere, where quiet.
+/// The stream for text for people; null where quiet.
 std::FILE* stream_beside_json(const std::filesystem::path& json, bool quiet);
 
-/// Nothing where the path is empty. On stdout it is ASCII.
+/// Does nothing where the path is empty. On stdout the text is ASCII.
 void write_json(const std::filesystem::path& to, const nlohmann::json& json);
 
-/// `path` as it stands in that file: as seen from its folder, and only the last name where the two
-/// have no folder in common, so that the file says nothing of the rest of the machine.
+/// `path` as it is written in that file: relative to the file's folder, or only the last name where
+/// the two have no folder in common, so that the file tells nothing about the rest of the machine.
 std::string name_in_json(const std::filesystem::path& to, const std::filesystem::path& path);
 
-/// Texts, at any depth, with `path` replaced by its last name.
+/// Replaces `path` by its last name in all texts, at any depth.
 void leave_folders_out(nlohmann::json& texts, const std::filesystem::path& path);
 
-// Notes on stderr about work that may take long: nothing of what is quick.
+// Notes on stderr about work that may take long; quick work has none.
 
 class SlowProgress {
   public:
-    /// what: as "measuring".
+    /// what: for example "measuring".
     explicit SlowProgress(std::string what) : what_(std::move(what)) {}
 
-    /// "measuring: 12 pictures", "palette: 40 %"; none in the first 5 s, then one every 5 s.
+    /// Prints "measuring: 12 pictures" or "palette: 40 %": nothing in the first 5 s, then a note
+    /// every 5 s.
     void at(std::size_t count, const char* unit) { note(fmt::format("{} {}", count, unit)); }
     void at(double share) { note(fmt::format("{:.0f} %", 100 * share)); }
 

@@ -18,7 +18,7 @@ namespace darb {
 
 namespace {
 
-/// black, white or #rrggbb.
+/// Reads black, white or #rrggbb.
 glm::vec3 parse_colour(const std::string& text) {
     if (lower(text) == "black") return glm::vec3(0);
     if (lower(text) == "white") return glm::vec3(1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// darb plan X: which effects a data set or a scene calls for, why, and what each costs here.
+// darb plan X: which effects a data set or a scene needs, why, and what each costs on this device.
 #include <fmt/format.h>
 #include <algorithm>
 #include <chrono>
@@ -34,18 +34,17 @@
 
 namespace darb {
 
-/// Trains on the views that are not held out; every 8th is where the source names none. options:
-/// kernel and iterations count. Throws Error where there are no photos both to train on and to
-/// hold out.
+/// Trains on the views that are not held out, which are every 8th where the source names none.
+/// options: kernel and iterations are used. Throws Error where there are no photos for both
+/// training and measuring.
 AntialiasProbe probe_antialias(const DeviceOptions& device, const Dataset& dataset,
                                const TrainOptions& options, const EffectPlan& plan);
 
-/// Tries options.kernel, whose shape each splat learns, beside the Gaussian; both as the plan has
-/// it.
+/// Tries options.kernel, whose shape each splat learns, beside the Gaussian, both as planned.
 Trial try_shape(const DeviceOptions& device, const Dataset& dataset, const TrainOptions& options,
                 const EffectPlan& plan);
-/// Tries --exposure-grid beside one map a photo, where the plan has exposure. Pictures are fitted
-/// to the held-out photos' exposure before they are measured.
+/// Tries --exposure-grid beside one map for each photo, where the plan has exposure. Pictures are
+/// fitted to the exposure of the held-out photos before they are measured.
 Trial try_exposure_grid(const DeviceOptions& device, const Dataset& dataset,
                         const TrainOptions& options, const EffectPlan& plan);
 
@@ -59,17 +58,17 @@ nlohmann::json probe_json(const AntialiasProbe& probe);
 struct Arm {
     ProbedRun run;
     SplatModel model;
-    std::vector<double> turns_s;  // all but the first, in which shaders are compiled
+    std::vector<double> turns_s;  // all but the first turn, which compiles shaders
 };
 
-/// Runs of these options side by side, a few iterations of each in turn, the order of turns
-/// changing: what the machine does meanwhile falls on all of them alike.
+/// Runs these options side by side, a few iterations of each in turn and in changing order, so that
+/// other work of the machine affects all of them alike.
 std::vector<Arm> train_arms(Device& device, const Dataset& dataset,
                             const std::vector<ImageU8>& photos,
                             const std::vector<TrainOptions>& options);
 
 /// By how much a turn of `other` takes longer than one of `one`: the median, which a turn that
-/// compiles does not move.
+/// compiles does not change.
 double price_of(const Arm& one, const Arm& other);
 
 namespace {
@@ -77,14 +76,14 @@ namespace {
 using nlohmann::json;
 
 struct PlanFlags {
-    PlanRequest plan;  // except for its kernel, which is words at first
+    PlanRequest plan;  // all but its kernel, which is text at first
     std::filesystem::path json;
     bool quiet = false, no_price = false, compare = false, probe = false;
     int probe_iterations = 400;
     KernelFlags kernel;
 };
 
-// Refuses flags that only a data set takes; open_subject() looks at the others.
+// Refuses flags that only a data set takes; open_subject() checks the others.
 void refuse_for_scenes(const PlanFlags& flags) {
     const auto refuse = [&](bool given, const char* flag) {
         if (given)
@@ -119,7 +118,7 @@ std::vector<Trial> try_on_subject(const PlanSubject& s, const PlanFlags& flags,
     return trials;
 }
 
-// none, auto and all as wholes.
+// Compares none, auto and all as a whole.
 json compare_choices(const PlanSubject& s, const PlanFlags& flags) {
     json list = json::array();
     for (const char* name : {"none", "auto", "all"}) {
@@ -223,7 +222,7 @@ namespace {
 
 constexpr double kScales[] = {0.5, 1, 2, 4};
 
-/// The data set with photos set aside.
+/// The data set with some photos held out.
 Dataset probed_dataset(const Dataset& source, const EffectPlan& plan) {
     Dataset dataset = source;
     mark_held_out(dataset.views, {});
@@ -246,7 +245,7 @@ SceneEvaluation evaluation_of(const Dataset& dataset, const TrainOptions& run) {
 
 namespace {
 
-/// Runs both ways, which prepare() makes from the options that the plan leaves.
+/// Runs both variants, which prepare() makes from the planned options.
 Trial run_trial(const DeviceOptions& device_options, const Dataset& source,
                 const TrainOptions& options, const EffectPlan& plan, Trial trial,
                 const std::function<void(TrainOptions& usual, TrainOptions& tried)>& prepare,
@@ -323,7 +322,7 @@ AntialiasProbe probe_antialias(const DeviceOptions& device_options, const Datase
     return probe;
 }
 
-// What the probes of darb plan say.
+// What the probes of darb plan report.
 
 namespace {
 

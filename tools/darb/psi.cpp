@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// darb psi: the correction factor of a kernel three ways, and how far its splats are from the true
-// projection.
+// darb psi: the correction factor of a kernel, computed in three ways, and how far its splats are
+// from the true projection.
 
 #include <fmt/format.h>
 

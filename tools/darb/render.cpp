@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// darb render SCENE.ply --cameras X -o DIR: a PNG of each camera; without cameras a film of a path
-// or a turn.
+// darb render SCENE.ply --cameras X -o DIR: a PNG for each camera, or without cameras a film of a
+// path or a turn.
 #include "tools/darb/render.h"
 
 #include <fmt/format.h>
@@ -64,14 +64,15 @@ struct RenderFlags {
     StoredUnits units;
 };
 
-/// cameras: the option that they stand against.
+/// cameras: the option that excludes these.
 void add_film_flags(CLI::App& command, FilmFlags& flags, CLI::Option* cameras);
 /// Returns the exit code. Throws Error.
 int render_film(const RenderFlags& flags, const Accuracy& accuracy, const EffectChoice& choice);
 
 namespace {
 
-// -r of a camera list, which states sizes rather than photos: divisor up to 8, width above.
+// Applies -r to a camera list, which states sizes rather than photos: up to 8 is a divisor, above
+// it a width.
 void scale_camera(Camera& camera, int resolution) {
     if (resolution == -1) return;
     if (resolution < 1)
@@ -186,11 +187,11 @@ void add_render(CLI::App& app, Action& action) {
 
 namespace {
 
-// Viridis, from its near end: five of its colours.
+// Five colours of Viridis, from its near end.
 constexpr std::array<std::array<float, 3>, 5> kDepthColours{
     {{253, 231, 37}, {93, 201, 99}, {33, 144, 141}, {59, 82, 139}, {68, 1, 84}}};
 
-/// Rounded up to two digits.
+/// Rounds up to two digits.
 double unit_for(double farthest) {
     const double unit = farthest / kDepthSteps;
     const double digit = std::pow(10.0, std::floor(std::log10(unit)) - 1);
@@ -278,7 +279,7 @@ namespace {
 constexpr const char* kUsualSize = "1280x720";
 constexpr int kUsualFps = 30;
 
-// What is given, else what the path says.
+// The size that was given, otherwise the path's.
 PixelSize film_size(const FilmFlags& flags, const CameraPath& path) {
     if (!flags.size.empty()) return parse_size(flags.size);
     return path.width > 0 ? PixelSize{path.width, path.height} : parse_size(kUsualSize);
@@ -289,7 +290,7 @@ int film_fps(const FilmFlags& flags, const CameraPath& path) {
     return path.fps > 0 ? std::clamp(static_cast<int>(std::lround(path.fps)), 1, 240) : kUsualFps;
 }
 
-/// What the turn goes around is what these look at; those beside the scene may be unreadable.
+/// The cameras whose subject the turn circles; those beside the scene may be unreadable.
 std::vector<Camera> cameras_of_turn(const RenderFlags& flags) {
     if (!flags.film.around.empty()) return cameras_of(open_cameras(flags.film.around));
     try {

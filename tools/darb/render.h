@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Depth images beside the frames of darb render.
+// The depth images beside the frames of darb render.
 #pragma once
 
 #include <filesystem>
@@ -13,38 +13,39 @@
 namespace darb {
 
 struct DepthFlags {
-    std::string format;   // png or npy; empty: none asked for
+    std::string format;   // png or npy; empty: none
     double unit = 0.001;  // world units of one step of a PNG
 };
 
-/// Throws Error where depths are on and the accuracy has no place for them, or are asked for and
-/// the effects leave them out.
+/// Throws Error where depths are asked for and the accuracy cannot hold them, or the effects leave
+/// them out.
 void check_depth(const DepthFlags& flags, const Accuracy& accuracy, const EffectChoice& effects);
 
-/// FRAME_depth.png or FRAME_depth.npy, and FRAME_depth_colours.png, a picture of it for people.
+/// The names FRAME_depth.png or FRAME_depth.npy, and FRAME_depth_colours.png, a picture of it for
+/// people.
 std::vector<std::filesystem::path> depth_files(const DepthFlags& flags,
                                                const std::filesystem::path& frame);
 
-/// Those of all frames, behind what else is written.
+/// Appends the depth files of all frames.
 void add_depth_files(const DepthFlags& flags, const std::vector<std::filesystem::path>& frames,
                      std::vector<std::filesystem::path>& files);
 
-/// Near yellow over green to far dark blue, from the 1st to the 99th percentile of what is seen;
-/// black where nothing is. depth: first channel, 0 where nothing is seen.
+/// From near yellow over green to far dark blue, between the 1st and the 99th percentile of what is
+/// seen; black where nothing is. depth: first channel, 0 where nothing is seen.
 ImageU8 depth_picture(const ImageF& depth);
 
 class DepthFiles {
   public:
     explicit DepthFiles(const DepthFlags& flags) : flags_(flags) {}
-    /// depth: Renderer::render_depth. FRAME_depth.png in steps of the unit, or FRAME_depth.npy in
-    /// world units; beside it the picture.
+    /// depth: from Renderer::render_depth. Writes FRAME_depth.png in steps of the unit, or
+    /// FRAME_depth.npy in world units, and the picture beside it.
     void write(const std::filesystem::path& frame, const ImageF& depth);
-    /// Says on stderr how many pixels lay beyond the last step, and which unit holds all.
+    /// Prints on stderr how many pixels lay beyond the last step, and which unit would hold all.
     void print_clipped() const;
 
   private:
     DepthFlags flags_;
-    DepthRange range_;  // range over all that were written
+    DepthRange range_;  // over all that were written
 };
 
 }  // namespace darb

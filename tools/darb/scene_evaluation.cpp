@@ -23,18 +23,18 @@
 namespace darb {
 
 namespace {
-struct ViewNumbers {  // numbers of one view, on their way from another rank
+struct ViewNumbers {  // one view's numbers, on their way from another rank
     double psnr_db, ssim;
     bool has_depth;
     DepthError depth;
 };
 
-// A depth is of whole pixels, and 16 bits do not hold it.
+// Depths need whole pixels, and 16 bits do not hold them.
 bool renders_depth(const Accuracy& accuracy) {
     return accuracy.value(kStorage) == STORAGE_FLOAT32 && accuracy.value(kRenderScale) == 1;
 }
 
-// What decides which views are measured, and the pictures.
+// Checks that the ranks agree on which views are measured, and on the pictures.
 void check_agreement(Ranks& ranks, const Device& device, const SplatModel& model,
                      const std::vector<View>& views, const SceneEvaluation& options,
                      const EffectPlan& plan) {
@@ -117,7 +117,7 @@ std::vector<AtScale> evaluate_scales(Device& device, const SplatModel& model,
     return rows;
 }
 
-// Evaluations as JSON and as tables for people: declared in scene_evaluation.h.
+// Writes evaluations as JSON and as tables for people; scene_evaluation.h declares this.
 
 namespace {
 

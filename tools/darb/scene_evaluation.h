@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A scene's pictures measured against photos, at the photos' size and at others.
+// Measures a scene's pictures against photos, at the photos' size and at others.
 #pragma once
 
 #include <cstdio>
@@ -21,27 +21,28 @@ struct SceneEvaluation {
     Accuracy accuracy = preset_accuracy(kBalanced);
     EffectChoice effects;
     glm::vec3 background{0.0f};
-    bool fit_exposure = false;   // fit each picture's to its photo first
-    bool align_cameras = false;  // align each camera to its photo first, by CameraAlignment
-    bool alpha_is_mask = false;  // as the data set has it
-    double depth_scale = 1;      // likewise; measured depths are compared where views have them
-    Ranks* ranks = nullptr;      // ranks that measure views in turn; null: this process does all
+    bool fit_exposure = false;   // first fit each picture's exposure to its photo
+    bool align_cameras = false;  // first align each camera to its photo, by CameraAlignment
+    bool alpha_is_mask = false;  // as in the data set
+    // as in the data set; measured depths are compared where views have them
+    double depth_scale = 1;
+    Ranks* ranks = nullptr;  // ranks that share the views; null: only this process
 };
 
-/// What a model's pictures of these views have, and their means; views: at the size to measure at.
+/// Measures the model's pictures of these views, and their means. views: at the size to measure at.
 /// Throws Error where a picture is too large for the device.
 Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<View> views,
                           const SceneEvaluation& options);
 
-/// An evaluation at one of the scales.
+/// An evaluation at one of several scales.
 struct AtScale {
     double scale = 1;
     int width = 0, height = 0;  // px, of the first view
     Evaluation evaluation;
 };
 
-/// {"mean": ..., "views": ...}, or {"scales": [the same with scale, width and height]}.
-/// The same at several sizes: scales[i] is of sizes[i].
+/// {"mean": ..., "views": ...}, or {"scales": [the same with scale, width and height]}. This
+/// measures at several sizes: scales[i] belongs to sizes[i].
 std::vector<AtScale> evaluate_scales(Device& device, const SplatModel& model,
                                      const std::vector<double>& scales,
                                      const std::vector<std::vector<View>>& sizes,
@@ -49,11 +50,11 @@ std::vector<AtScale> evaluate_scales(Device& device, const SplatModel& model,
 
 nlohmann::json evaluation_json(const Evaluation& evaluation);
 nlohmann::json evaluation_json(const std::vector<AtScale>& scales);
-/// A line a view, and their mean.
+/// Prints a line for each view, and their mean.
 void print_evaluation(std::FILE* out, const Evaluation& evaluation);
-/// How far depths are off, a line; nothing where none was measured.
+/// Prints in a line how far depths are off; nothing where none was measured.
 void print_depth(std::FILE* out, const Evaluation& evaluation);
-/// A line a scale: the means over its views.
+/// Prints a line for each scale: the means over its views.
 void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales);
 
 }  // namespace darb

@@ -8,15 +8,15 @@ namespace darb {
 
 namespace {
 
-constexpr int kShellBase = 128;  // plus the signal's number: a shell's exit code
+constexpr int kShellBase = 128;  // a shell's exit code is this plus the signal's number
 
-// A signal handler can reach nothing else.
+// A signal handler cannot reach anything but globals.
 std::atomic<bool> g_stop{false};
 std::atomic<int> g_signal{0};  // the first one
 std::atomic<bool> g_interrupted{false}, g_terminated{false};
 
-// Somebody who asks again does not want to wait. Hangups come twice by themselves, from the
-// terminal and from the shell, and a limit of processor time every second.
+// A user who asks again does not want to wait. Hangups arrive twice anyway, from the terminal and
+// from the shell, and a limit of processor time signals every second.
 void on_stop(int signal) {
     const bool again = (signal == SIGINT && g_interrupted.exchange(true)) ||
                        (signal == SIGTERM && g_terminated.exchange(true));

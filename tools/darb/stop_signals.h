@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Signals that ask a run to save and end.
+// Signals that ask a run to save its state and end.
 #pragma once
 
 #include <atomic>
 
 namespace darb {
 
-/// Set by SIGINT, SIGTERM, SIGHUP and SIGXCPU from now on. A second SIGINT, or a second SIGTERM,
-/// ends the process at once; a hangup that was ignored from the start (nohup) stays so.
+/// From now on SIGINT, SIGTERM, SIGHUP and SIGXCPU set this flag. A second SIGINT or a second
+/// SIGTERM ends the process at once. A hangup that was ignored from the start (nohup) stays
+/// ignored.
 std::atomic<bool>& stop_on_signals();
 
-/// SIGPIPE no longer ends the process: the write that it is about fails instead.
+/// SIGPIPE no longer ends the process; the write that caused it fails instead.
 void go_on_without_readers();
-/// The same for SIGXFSZ, a limit of the size of files.
+/// Does the same for SIGXFSZ, the limit of file sizes.
 void fail_at_the_file_limit();
 
-/// Exit code for the signal that set it: 128 and its number, as shells have it; 0: none.
+/// The exit code for the signal that set the flag: 128 plus its number, as in shells; 0: none.
 int stop_exit_code();
-/// Name of that signal, as "SIGTERM"; empty: none.
+/// The name of that signal, such as "SIGTERM"; empty: none.
 const char* stop_name();
 
 }  // namespace darb

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// darb train DATASET -o OUT: photos to a splat scene.
+// darb train DATASET -o OUT: turns photos into a splat scene.
 #include <fmt/format.h>
 #include <algorithm>
 #include <array>
@@ -43,23 +43,24 @@
 
 namespace darb {
 
-/// "auto" as 0 x 0, else columns x rows. Throws Error for anything else.
+/// Reads "auto" as 0 x 0, otherwise columns x rows. Throws Error for anything else.
 Grid parse_blocks(const std::string& text);
 
-/// The run of a complete request. Throws Error where an option was given that has no place beside
-/// --blocks. Returns the exit code.
+/// Runs a complete request in blocks. Throws Error where an option was given that cannot be
+/// combined with --blocks. Returns the exit code.
 int train_blocks(Ranks& ranks, const TrainRequest& request, const RunShown& shown, bool retune);
 
 // How ranks tune their devices.
 
-/// Each rank measures its own device, and of equal ones each might choose another way: the device
-/// takes the choice of rank 0's, but for keeps_own. All ranks ask, whatever their options are.
+/// Each rank would measure its own device, and equal devices might get different choices. So the
+/// device takes the choices of rank 0, except for keeps_own. All ranks must call this, whatever
+/// their options are.
 void take_tuning_of_first(Ranks& ranks, Device& device, bool keeps_own);
 
 namespace {
 
-// The scene as a web page, with the photos' cameras as its bookmarks; of a run that was finished
-// before, where there is none yet.
+// Writes the scene as a web page with the photos' cameras as bookmarks; also for a run that was
+// finished before, where there is no page yet.
 void leave_page(Device& device, const TrainJob& job, const TrainResult& result) {
     const TrainRequest& request = job.request;
     const std::filesystem::path file = request.output / "scene.html";
@@ -83,7 +84,7 @@ void refuse_stereo(const TrainJob& job, int ranks) {
                     job.dataset.points.size() > 0 ? "points" : "random"));
 }
 
-// Whatever takes a folder or a window for itself.
+// Refuses what needs a folder or a window to itself.
 void check_for_ranks(const Ranks& ranks, const TrainRequest& request, bool view) {
     if (ranks.count() == 1) return;
     if (view)
@@ -92,8 +93,8 @@ void check_for_ranks(const Ranks& ranks, const TrainRequest& request, bool view)
     refuse_without_cameras(request, ranks.count());
 }
 
-// `darb train --resume -o OUT` alone goes on with the request of the run. What was typed beside it
-// says where and how it shows, not what it trains.
+// `darb train --resume -o OUT` alone goes on with the saved request. Options typed beside it say
+// where it runs and how it is shown, but not what it trains.
 void recall_request(const std::vector<std::string>& typed, TrainRequest& request) {
     constexpr std::array<std::string_view, 12> kBeside{
         "--resume", "-o",      "-m",     "--output", "--model-path", "--device",
@@ -117,7 +118,7 @@ void recall_request(const std::vector<std::string>& typed, TrainRequest& request
     request = std::move(recalled);
 }
 
-// What follows from the command line, before anything is opened.
+// Completes the request by what follows from the command line, before anything is opened.
 void complete_flags(TrainRequest& request, bool quiet) {
     const bool named = !request.output.empty();
     complete_request(request);
@@ -194,7 +195,7 @@ namespace {
 
 constexpr int kMostASide = 64;
 
-// What follows the number; nullptr: there is none from 1 to kMostASide.
+// Reads a side of the grid and returns what follows it; nullptr: not a number from 1 to kMostASide.
 const char* read_side(const char* at, const char* end, int& side) {
     const auto [behind, failed] = std::from_chars(at, end, side);
     return failed == std::errc() && side >= 1 && side <= kMostASide ? behind : nullptr;
@@ -308,7 +309,7 @@ int train_blocks(Ranks& ranks, const TrainRequest& asked_run, const RunShown& sh
     take_tuning_of_first(ranks, *first, !request.tune.empty());
     tuning = first->tuning();
     if (ranks.is_first() && !shown.quiet) print_blocks_plan(*first, job);
-    first.reset();  // each part has one of its own
+    first.reset();  // each part has a device of its own
     const BlocksJob blocks{
         job.dataset,
         job.options,

@@ -30,7 +30,7 @@ constexpr Removed kRemoved[] = {
      "The strategy budget is adc, steered to a number: it resets opacities as adc does."},
 };
 
-// Options that are no more, as flags that are not shown: an Error says what replaced them.
+// Options that no longer exist are hidden flags whose Error says what replaced them.
 void add_removed_options(CLI::App& command) {
     for (const Removed& one : kRemoved)
         command
@@ -76,7 +76,7 @@ void add_row(CLI::App& command, const RequestOption& option, GivenOptions& given
     if (option.before_others) added->allow_extra_args(false);
 }
 
-// How the command shows its run, beside the rows that help has before them.
+// How the command shows its run, in addition to the rows, which come first in the help.
 void add_own_flags(CLI::App& command, const std::string& behind, TrainFlags& f) {
     if (behind == "--resume") {
         command.add_flag("--view", f.shown.view, "watch the run; closing the window lets it go on")

@@ -22,11 +22,11 @@ namespace darb {
 
 namespace {
 
-constexpr int kShortRun = 200;          // iterations: over sooner than the measurement
+constexpr int kShortRun = 200;  // iterations: such a run is over sooner than the measurement
 constexpr double kLongSeconds = 3'600;  // from here on a smaller -r is suggested
-constexpr int kSmallSide = 400;         // px: no smaller photos are suggested
+constexpr int kSmallSide = 400;         // px: smaller photos are not suggested
 
-// The next -r that divides the photos' sides by two, where that leaves enough of them.
+// The next -r, which halves the photos' sides, where that leaves enough of them.
 std::optional<int> smaller_resolution(const std::vector<View>& views) {
     const View& view = views.front();
     if (std::max(view.camera.width, view.camera.height) < 2 * kSmallSide) return std::nullopt;
@@ -36,7 +36,7 @@ std::optional<int> smaller_resolution(const std::vector<View>& views) {
     return view.camera.width / 2;
 }
 
-// Two digits: more would promise what a rule of thumb cannot keep.
+// Two digits, because more would promise what a rule of thumb cannot keep.
 std::string about(std::uint32_t count) {
     std::uint32_t unit = 1;
     while (count / unit >= 100) unit *= 10;
@@ -62,8 +62,8 @@ std::string time_text(const Forecast& f, const TrainOptions& options) {
     return text + later;
 }
 
-// Exact where the counts come true; the counts are a rule of thumb, so what a splat takes is said,
-// too.
+// The memory is exact if the counts come true. They are a rule of thumb, so the text also says what
+// one splat takes.
 std::string memory_text(const Device& device, const Forecast& f) {
     const auto bytes = [&](const MemoryDemand& demand) {
         return static_cast<double>(plan_memory(device, demand).total());
@@ -101,7 +101,8 @@ void print_advice(const Device& device, const Dataset& dataset, const Forecast& 
         say("hint:{}\n", advice);
 }
 
-constexpr double kSlowSeconds = 1'800;  // a bare run that takes longer is told of a quicker one
+// for a longer run without options, a quicker one is suggested
+constexpr double kSlowSeconds = 1'800;
 
 // The data set with photos of at most that width.
 Dataset at_width(Dataset dataset, int width) {
@@ -115,15 +116,15 @@ std::string time_of(double seconds) {
     return seconds > 0 ? "about " + format_duration(seconds) : "not measured";
 }
 
-// A word that the shell takes apart stands in quotes.
+// Quotes a word that the shell would take apart.
 std::string typed(const std::string& word) {
     const bool plain = word.find_first_of(" '\"\\$`&|;<>()*?[]#~!{}") == std::string::npos;
     return plain ? word : shell_quoted(word);
 }
 
-// How long the preset of a run and those below it take here, and of a bare run that is slow what to
-// type instead; nothing where --iterations was given. chosen: the forecast of the run. Measures
-// each for a few seconds.
+// Prints how long the run's preset and those below it take here, and for a slow run without options
+// what to type instead; nothing where --iterations was given. chosen: the forecast of the run.
+// Measures each preset for a few seconds.
 void print_presets(Device& scratch, const TrainJob& job, const Forecast& chosen) {
     const TrainRequest& request = job.request;
     if (was_given(request, "--iterations") || chosen.seconds <= 0) return;
@@ -144,7 +145,8 @@ void print_presets(Device& scratch, const TrainJob& job, const Forecast& chosen)
                             preset.summary, preset.iterations,
                             width_given ? "" : fmt::format(" at {} px", preset.width),
                             time_of(seconds));
-        if (preset.name == own) break;  // those above take longer still, and longer to measure
+        // the larger presets take longer still, and longer to measure
+        if (preset.name == own) break;
         instead += fmt::format("\n  darb train {} -o {} --preset {}    {}", typed(request.dataset),
                                typed(request.output.string()), preset.name, time_of(seconds));
     }
@@ -198,7 +200,7 @@ void print_plan(Device& device, TrainJob& job, bool quiet) {
     const auto held_out =
         static_cast<std::size_t>(std::ranges::count_if(dataset.views, &View::is_test));
     if (!quiet) print_scene(device, job, held_out);
-    // A resumed run knows better: its progress shows the time left.
+    // A resumed run knows better, and its progress shows the time left.
     if (job.resume_from.empty() && held_out < dataset.views.size())
         print_forecast(device, job, quiet);
 }

@@ -8,11 +8,11 @@
 namespace darb {
 
 /// Prints views, notes, and the forecast of splats, time and memory on this device, which takes a
-/// few seconds; for a quiet run only a warning. Leaves the forecast of the pace in the job, even
-/// for a quiet run, as run.jsonl has it.
+/// few seconds; a quiet run prints only warnings. The forecast of the pace is also kept in the job,
+/// even for a quiet run, because run.jsonl records it.
 void print_plan(Device& device, TrainJob& job, bool quiet);
 
-/// A note for find_start(), which takes about a second of a core for each photo.
+/// Prints a note before find_start(), which takes about a second of one core for each photo.
 void say_stereo_begins();
 
 }  // namespace darb

@@ -13,7 +13,7 @@ namespace darb {
 
 namespace {
 
-// The dearest first; what takes less than a hundredth of an iteration is not printed.
+// The most expensive passes first, without those that take less than a hundredth of an iteration.
 std::string passes_text(std::vector<ReportPass> passes) {
     std::string text;
     std::sort(passes.begin(), passes.end(),
@@ -30,7 +30,7 @@ std::string passes_text(std::vector<ReportPass> passes) {
     return text;
 }
 
-// What several ranks cost: of this part of a run that was resumed.
+// What several ranks cost; for a resumed run only in this part of it.
 std::string ranks_text(const RankGroup& ranks, const TrainResult& summary) {
     if (!ranks.several() || summary.trained_steps == 0) return "";
     const double steps = summary.trained_steps;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What `darb train` says at the end of a run.
+// What `darb train` prints at the end of a run.
 #pragma once
 
 #include <filesystem>
@@ -15,8 +15,8 @@ struct RunShown {
     bool view = false;                    // in a window
 };
 
-/// For a quiet run only the paths, and where it was interrupted, the command that goes on with it
-/// in its folder `output`.
+/// A quiet run prints only the paths. An interrupted one also prints the command that goes on with
+/// it in its folder `output`.
 std::string summary_text(const TrainResult& summary, const RunShown& shown,
                          const std::filesystem::path& output, const RankGroup& ranks);
 

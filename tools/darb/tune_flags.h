@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// --tune and --retune, and the choice of passes for commands that have neither.
+// --tune and --retune, and the choice of passes for commands without these options.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -16,15 +16,15 @@ struct TuneFlags {
 };
 
 void add_tune_flags(CLI::App& command, TuneFlags& flags);
-/// --retune alone.
+/// Adds --retune alone.
 void add_retune_flag(CLI::App& command, bool& retune);
 
-/// What the flags ask for, see engine/plan/tuner.h.
+/// Applies what the flags ask for; see engine/plan/tuner.h.
 inline void settle_tuning(Device& device, const TuneFlags& flags) {
     settle_tuning(device, flags.choice, flags.retune);
 }
 
-/// What would run on a device that is only listed, and why.
+/// Which choices a listed device would run with, and why.
 std::string tuning_of_listed(const DeviceInfo& info);
 
 }  // namespace darb

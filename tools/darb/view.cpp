@@ -49,29 +49,30 @@ struct MeasuredView {
     const std::atomic<bool>& lost;
 };
 
-/// A frame where one is wanted. Throws Error where the window was closed, its display is gone or
-/// the viewer has one.
+/// Draws a frame where one is wanted. Throws Error where the window was closed, its display is gone
+/// or the viewer shows an error.
 void pump(const MeasuredView& m, double patience_s);
 
 struct Rest {
-    double refined_s = 0, whole_s = 0;  // until all pixels; until all splats, too
+    // until the picture has all pixels; until it has all splats, too
+    double refined_s = 0, whole_s = 0;
 };
-/// Until the picture is whole.
+/// Waits until the picture is whole.
 Rest rest(const MeasuredView& m);
 
-/// The orbit's step of so many seconds.
+/// Turns the orbit by the step of this many seconds.
 void turn(ViewerWindow& window, double seconds);
-/// Orbits for so many seconds; adds each frame's time, ms.
+/// Orbits for this many seconds and adds each frame's time, ms.
 void move(const MeasuredView& m, double seconds, std::vector<double>& moving_ms);
 
 /// PSNR of frames in motion, as the window shows them, against the picture at rest from the same
-/// place; panels hidden; six places around the scene.
+/// place, with hidden panels, at six places around the scene.
 std::vector<double> compare_motion(const MeasuredView& m);
 
-// darb view --times: frame times of a window in motion and at rest, as a user would have them.
+// darb view --times: the frame times of a window in motion and at rest, as a user would see them.
 
-/// Waits for the scene that is being loaded, orbits it for five seconds, lets it rest; writes what
-/// that took as JSON and prints it in a line. Throws Error where the load fails, or where the
+/// Waits for the scene that is being loaded, orbits it for five seconds and lets it rest. Writes
+/// the times as JSON and prints them in a line. Throws Error where the load fails, or where the
 /// window is closed before the end.
 void write_view_times(ViewerWindow& window, const Device& device, const std::atomic<bool>& lost,
                       const std::filesystem::path& file);
@@ -79,7 +80,8 @@ void write_view_times(ViewerWindow& window, const Device& device, const std::ato
 // darb view with a window, until it is closed, its display ends or a signal comes.
 
 /// Returns the exit code: 0, or that of the signal that ended it. Throws Error where there is no
-/// display or the window fails. Where it ends by itself, what was not saved is recovered, and said.
+/// display or the window fails. Where the window ends by itself, unsaved work is recovered and
+/// reported.
 int view_in_window(const ViewFlags& flags, const ViewerOptions& options, const PixelSize& size,
                    const std::string& note);
 
@@ -97,7 +99,7 @@ void refuse_other_pictures(const std::filesystem::path& file) {
                 "Use .png or .jpg.");
 }
 
-// Writes the format that the name's ending says; PNG where it has none.
+// Writes the format that the name's ending asks for; PNG where it has none.
 void write_screenshot(const std::filesystem::path& file, const ImageU8& image) {
     if (is_jpeg_name(file))
         write_file_atomic(file, encode_jpeg(image, kJpegQuality));
@@ -132,7 +134,7 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
     return 0;
 }
 
-// Frames have names of their own, frame_00000.png and so on, which photos may have, too.
+// Frames have names of their own, such as frame_00000.png, which photos may have, too.
 void refuse_frames_among_photos(const std::filesystem::path& frames,
                                 const std::vector<View>& views) {
     std::error_code none;
@@ -157,7 +159,7 @@ int view(ViewFlags flags) {
         together({files_of(flags.scene), files_of(flags.cameras), files_of(flags.path)}));
     refuse_other_pictures(flags.screenshot);
     if (!flags.scene.empty())
-        check_scene_file(find_scene(flags.scene));  // says so before a window opens
+        check_scene_file(find_scene(flags.scene));  // reports an error before a window opens
     std::string note;
     options.views = find_views(flags, note);
     refuse_to_overwrite_inputs({flags.screenshot, flags.times}, files_of(options.views));
@@ -306,7 +308,7 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
 namespace {
 
 constexpr double kTurn_s = 20;  // time of a whole turn
-constexpr int kCompared = 6;    // frames in motion, each a sixth of a turn from the one before
+constexpr int kCompared = 6;    // frames in motion, a sixth of a turn apart
 
 }  // namespace
 
@@ -331,7 +333,8 @@ Rest rest(const MeasuredView& m) {
 }
 
 void turn(ViewerWindow& window, double seconds) {
-    leave_photo(window.viewer().session());  // as a drag does: a photo's camera stands still
+    // as a drag does, because a photo's camera does not move
+    leave_photo(window.viewer().session());
     window.viewer().session().navigation.orbit(2 * glm::pi<double>() * seconds / kTurn_s, 0);
     window.redraw();
 }
@@ -370,7 +373,7 @@ namespace {
 constexpr double kMotion_s = 5;  // time of the orbit
 constexpr int kRests = 5;
 
-/// "VmHWM", the most memory that the process has had, bytes; 0 where the system does not say.
+/// "VmHWM", the peak memory of the process in bytes; 0 where the system does not tell.
 double peak_memory_bytes() {
     if (!std::filesystem::exists("/proc/self/status")) return 0;
     const std::string text = read_text_file("/proc/self/status");
@@ -378,7 +381,7 @@ double peak_memory_bytes() {
     return at == std::string::npos ? 0 : 1024 * std::stod(text.substr(at + 6));
 }
 
-// Several rests after small turns.
+// Measures several rests after small turns.
 nlohmann::ordered_json rests_json(ViewerWindow& window, const MeasuredView& measured) {
     std::vector<double> refined_s, whole_s, rest_ms;
     for (int i = 0; i < kRests; ++i) {
@@ -411,7 +414,7 @@ void write_view_times(ViewerWindow& window, const Device& device, const std::ato
     const auto motion = ViewClock::now();
     move(measured, kMotion_s, moving_ms);
     const double frames_per_s = double(moving_ms.size()) / seconds_since(motion);
-    const double first_ms = moving_ms.front();  // before they are reordered
+    const double first_ms = moving_ms.front();  // taken before they are reordered
     const MotionQuality quality = s.times.quality;
     const nlohmann::ordered_json rests = rests_json(window, measured);
     std::vector<double> psnr_db = compare_motion(measured);
@@ -452,7 +455,7 @@ namespace {
 
 constexpr double kSignalNap_s = 0.2;  // between looks for signals and for the end of the display
 
-// What is not saved stays, where the window ends by itself.
+// Where the window ends by itself, unsaved work is kept.
 int show_until_closed(ViewerWindow& window, const std::atomic<bool>& lost) {
     const std::atomic<bool>& stop = stop_on_signals();
     const auto recovered = [&](const std::string& hint) {
@@ -463,7 +466,7 @@ int show_until_closed(ViewerWindow& window, const std::atomic<bool>& lost) {
     try {
         while (!stop && window.pump(kSignalNap_s))
             if (lost) throw Error("window", "the display is gone");
-    } catch (const std::exception& e) {  // memory that runs out, too
+    } catch (const std::exception& e) {  // also where memory runs out
         if (lost) throw Error("window", "the display is gone", recovered(""));
         const auto* known = dynamic_cast<const Error*>(&e);
         throw known != nullptr ? Error(known->where, known->reason, recovered(known->hint))
@@ -477,7 +480,8 @@ int show_until_closed(ViewerWindow& window, const std::atomic<bool>& lost) {
 
 int view_in_window(const ViewFlags& flags, const ViewerOptions& options, const PixelSize& size,
                    const std::string& note) {
-    std::atomic<bool> lost{false};  // the display; before what it outlives
+    // set when the display is gone; declared before what it must outlive
+    std::atomic<bool> lost{false};
     const WindowSystem windows;
     survive_display_loss(lost);
     DeviceOptions device_options = command_device(flags.device);

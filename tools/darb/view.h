@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What darb view takes on the command line, and how a viewer starts from it.
+// The command line of darb view, and how a viewer starts from it.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -29,10 +29,10 @@ struct ViewFlags {
 };
 
 void add_view_flags(CLI::App& command, ViewFlags& flags);
-/// The data set of --cameras; else cameras_beside the scene, and where those cannot be read none,
-/// and why in `note`. Throws Error.
+/// The data set of --cameras, otherwise cameras_beside the scene. Where those cannot be read there
+/// are none, and `note` says why. Throws Error.
 std::vector<View> find_views(const ViewFlags& flags, std::string& note);
-/// Display, panels, path and camera. Throws Error.
+/// Sets display, panels, path and camera. Throws Error.
 void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size);
 
 }  // namespace darb

@@ -16,13 +16,13 @@ namespace {
 constexpr ImU32 kOutline = IM_COL32(255, 200, 60, 255);
 constexpr int kCircleSteps = 64;
 
-// In double: far from the origin a float has no centimetres left.
+// The values are doubles, because far from the origin a float has no centimetres left.
 bool edit_vector(const char* label, glm::dvec3& v, float speed, int components) {
     return ImGui::DragScalarN(label, ImGuiDataType_Double, &v.x, components, speed, nullptr,
                               nullptr, "%.3f");
 }
 
-// What of it is before the camera.
+// Draws the part of the line that is in front of the camera.
 void line(const Camera& camera, const glm::dvec3& a, const glm::dvec3& b) {
     glm::dvec3 p = camera.rotation * a + camera.translation;
     glm::dvec3 q = camera.rotation * b + camera.translation;
@@ -71,14 +71,14 @@ void tool_choice(Session& s) {
                                                 "sphere", "move",      "turn",  "scale"};
     constexpr float kColumns[] = {0, 88, 186, 262};  // px at scale 1
     constexpr const char* kTips[kToolCount] = {
-        "left drag orbits, key 1",
-        "select by a rectangle, also what others hide; Shift adds, Ctrl takes away; key 2",
-        "select by an outline; Shift adds, Ctrl takes away; key 3",
-        "select by painting; Shift adds, Ctrl takes away; key 4",
-        "select around the splat where the drag begins; Shift adds, Ctrl takes away; key 5",
-        "drag an arrow: what is selected moves, or all where nothing is; key 6",
-        "drag a ring: what is selected turns, harmonics with it; key 7",
-        "drag the ring: what is selected grows or shrinks; key 8"};
+        "Drag with the left button to orbit (1)",
+        "Select in a rectangle, hidden splats behind others too; Shift adds, Ctrl takes away (2)",
+        "Select inside an outline; Shift adds, Ctrl takes away (3)",
+        "Select by painting; Shift adds, Ctrl takes away (4)",
+        "Select around the splat where the drag begins; Shift adds, Ctrl takes away (5)",
+        "Drag an arrow to move the selection, or everything if nothing is selected (6)",
+        "Drag a ring to turn the selection, together with its harmonics (7)",
+        "Drag the ring to scale the selection (8)"};
     for (int i = 0; i < kToolCount; ++i) {
         if (i % 4 != 0) ImGui::SameLine(kColumns[i % 4] * s.gui_scale);
         if (ImGui::RadioButton(kNames[i], static_cast<int>(s.tools.tool) == i))
@@ -87,7 +87,7 @@ void tool_choice(Session& s) {
     }
     if (s.tools.tool != Tool::brush) return;
     ImGui::SliderFloat("brush", &s.tools.brush_px, 4, 300, "%.0f px", kLogarithmic);
-    tip("radius on the screen");
+    tip("Radius of the brush on the screen");
 }
 
 void select(const SplatMask& mask, Session& s) {
@@ -114,20 +114,20 @@ void selection_buttons(Session& s) {
     if (ImGui::Button("Grow"))
         show_edit(
             s.edit.select(grown(model, s.edit.selected(), double{s.tools.grow}), Combine::add), s);
-    tip("adds the splats that are nearer to a selected one than the distance beside");
+    tip("Add all splats that are nearer to a selected one than the distance on the right");
     ImGui::SameLine();
     ImGui::SetNextItemWidth(70 * s.gui_scale);
     ImGui::DragFloat("##grow", &s.tools.grow, s.tools.grow / 100, 1e-6f, 1e6f, "%.3g units",
                      kClamped);
-    tip("in units of the scene; drag, or Ctrl+click to type");
+    tip("In units of the scene; drag, or Ctrl+click to type");
     if (ImGui::Button("Hide")) show_edit(s.edit.hide_selected(), s);
-    tip("what is selected, Ctrl+H; it is saved all the same");
+    tip("Hide the selection (Ctrl+H); hidden splats are still saved");
     ImGui::SameLine();
     if (ImGui::Button("Show")) show_edit(s.edit.show_hidden(), s);
-    tip("what is hidden, Ctrl+U");
+    tip("Show everything that is hidden (Ctrl+U)");
     ImGui::SameLine();
     if (ImGui::Button("Delete")) show_edit(s.edit.remove_selected(), s);
-    tip("what is selected, key Delete");
+    tip("Delete the selection (Delete)");
 }
 
 void undo_buttons(Session& s) {
@@ -149,56 +149,56 @@ void select_by_value(Session& s) {
     const float top = static_cast<float>(s.scene->bounds.radius);
     ImGui::DragFloatRange2("##opacity", &t.opacity[0], &t.opacity[1], 0.005f, 0, 1, "%.3f", "%.3f",
                            kClamped);
-    tip("opacity from and to, 0 to 1");
+    tip("Lowest and highest opacity, 0 to 1");
     ImGui::SameLine();
     if (ImGui::Button("opacity"))
         select(by_opacity(m, double{t.opacity[0]}, double{t.opacity[1]}), s);
-    tip("select these; Shift adds, Ctrl takes away");
+    tip("Select the splats in this range; Shift adds, Ctrl takes away");
     ImGui::DragFloatRange2("##scale", &t.scale[0], &t.scale[1], top / 500, 0, 100 * top, "%.3g",
                            "%.3g", kClamped);
-    tip("largest standard deviation from and to, units of the scene");
+    tip("Smallest and largest size: the largest standard deviation, in units of the scene");
     ImGui::SameLine();
     if (ImGui::Button("size")) select(by_scale(m, double{t.scale[0]}, double{t.scale[1]}), s);
-    tip("select these; Shift adds, Ctrl takes away");
+    tip("Select the splats in this range; Shift adds, Ctrl takes away");
     ImGui::ColorEdit3("##colour", &t.colour.x, ImGuiColorEditFlags_NoInputs);
-    tip("sRGB");
+    tip("The colour to look for, sRGB");
     ImGui::SameLine();
     ImGui::SetNextItemWidth(110 * s.gui_scale);
     ImGui::SliderFloat("##tolerance", &t.tolerance, 0, 1, "within %.2f", kClamped);
-    tip("of each channel, 0 to 1");
+    tip("How far each channel may be from it, 0 to 1");
     ImGui::SameLine();
     if (ImGui::Button("colour")) select(by_colour(m, glm::dvec3(t.colour), double{t.tolerance}), s);
-    tip("select these, by their colour without harmonics; Shift adds, Ctrl takes away");
+    tip("Select by the colour without harmonics; Shift adds, Ctrl takes away");
     ImGui::TreePop();
 }
 
 void select_by_region(Session& s) {
     if (!ImGui::TreeNode("Select by box or sphere")) return;
     ImGui::Checkbox("show it", &s.selection.shown);
-    tip("its outline over the picture");
+    tip("Show the outline over the picture");
     int shape = s.selection.region.shape == Region::Shape::sphere ? 1 : 0;
     if (ImGui::Combo("shape", &shape, "box\0sphere\0"))
         s.selection.region.shape = shape == 1 ? Region::Shape::sphere : Region::Shape::box;
-    tip("along the axes of the file, or round");
+    tip("A box along the axes of the file, or a sphere");
     const float speed = static_cast<float>(s.scene->bounds.radius / 200);
     bool moved = edit_vector("centre", s.selection.region.centre, speed, 3);
     tip("x, y, z in units of the scene; drag, or Ctrl+click to type");
     moved |= edit_vector(shape == 1 ? "radius" : "half size", s.selection.region.half_size, speed,
                          shape == 1 ? 1 : 3);
-    tip("in units of the scene; drag, or Ctrl+click to type");
+    tip("In units of the scene; drag, or Ctrl+click to type");
     s.selection.region.half_size = glm::max(s.selection.region.half_size, glm::dvec3(1e-6));
     if (ImGui::Button("Centre on the pivot")) {
         s.selection.region.centre = s.navigation.pivot();
         moved = true;
     }
-    tip("what the camera turns around");
+    tip("The pivot is the point that the camera turns around");
     if (moved) s.selection.shown = true;
     if (ImGui::Button("Select")) select(in_region(s.scene->model, s.selection.region), s);
-    tip("splats whose centre is inside; Shift adds, Ctrl takes away");
+    tip("Select the splats whose centre is inside; Shift adds, Ctrl takes away");
     ImGui::SameLine();
     if (ImGui::Button("Crop to it"))
         show_edit(s.edit.remove(s.scene->model, s.selection.region, false), s);
-    tip("deletes the splats whose centre is outside");
+    tip("Delete the splats whose centre is outside");
     ImGui::TreePop();
 }
 
@@ -206,7 +206,7 @@ void format_choice(Session& s) {
     constexpr const char* kEndings[] = {".ply", ".compressed.ply", ".splat", ".spz", ".sog",
                                         ".glb"};
     if (!ImGui::BeginCombo("format", "as ...")) {
-        tip("another ending for the file, and so another format");
+        tip("Choose a format; this changes the file's ending");
         return;
     }
     const std::string stem = stem_to_write(s.save_file);
@@ -237,17 +237,17 @@ void edit_panel(Session& s) {
     select_by_value(s);
     select_by_region(s);
     if (ImGui::Button("Merge a scene ...")) s.ask(request::ShowOpen{true});
-    tip("its splats come into this one, in the place that their file gives them");
+    tip("Add the splats of another file to this scene, at the positions that they have there");
     path_field("file", s.save_file);
-    tip("its ending says in which format");
+    tip("The ending of the name decides the format");
     ImGui::SameLine();
     if (ImGui::Button("Save")) s.ask(request::Save{});
-    tip("the scene as it is edited, Ctrl+S");
+    tip("Save the edited scene (Ctrl+S)");
     format_choice(s);
     if (ImGui::Button("Save as web page")) s.ask(request::SavePage{});
-    tip("an .html beside the file, for any browser");
+    tip("Write an .html file for any browser beside the file");
     ImGui::Checkbox("save upright", &s.save_upright);
-    tip("turns what is saved so that up is -y, as most programs want it");
+    tip("Turn the saved scene so that up is -y, as most programs expect");
     ImGui::PopID();
 }
 

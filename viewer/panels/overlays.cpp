@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Pictures side by side: the choice of kernels, the lines between panes, and what each pane shows.
+// Pictures side by side: the choice of kernels, the lines between panes, and a label for each pane.
 #include <imgui.h>
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@ namespace darb {
 
 namespace {
 
-constexpr float kGrip = 12;     // px at scale 1, where a line can be taken
+constexpr float kGrip = 12;     // px at scale 1; how near to a line it can be grabbed
 constexpr float kLabelGap = 8;  // px
 constexpr ImU32 kLine = IM_COL32(255, 255, 255, 230), kEdge = IM_COL32(0, 0, 0, 160);
 constexpr ImU32 kLabelBack = IM_COL32(16, 18, 22, 215), kLabel = IM_COL32(240, 240, 240, 255);
@@ -72,8 +72,8 @@ void draw_line(const Session& s, float share, const ImVec2& size) {
             ImVec2(x + side * 2 * unit, y + 4 * unit), IM_COL32(40, 40, 40, 255));
 }
 
-// From its strip's left edge, right of the panel, in the first row that is free there; none where
-// the strip is hidden. ends: px, where the labels of each row end.
+// Draws a label at the strip's left edge, right of the panel, in the first row that is free there;
+// draws none where the strip is hidden. ends: the px at which the labels of each row end.
 void draw_label(const Session& s, const std::string& text, float left, float right,
                 std::vector<float>& ends) {
     const float gap = kLabelGap * s.gui_scale, window = ImGui::GetIO().DisplaySize.x;
@@ -131,21 +131,23 @@ void panes_panel(Session& s) {
         }
         ImGui::EndCombo();
     }
-    tip("up to three more kernels, each in a strip of the picture; drag the lines between them");
+    tip("Show up to three more kernels, each in a strip of the picture; drag the lines between "
+        "them");
     if (s.panes.lines.empty()) return;
-    ImGui::Checkbox("error to the leftmost", &s.panes.difference);
-    tip("all strips but the leftmost show their difference to it, as heat");
+    ImGui::Checkbox("error against the leftmost", &s.panes.difference);
+    tip("Show how all other strips differ from the leftmost, as heat");
     if (s.panes.difference) {
         ImGui::SliderFloat("error hottest at", &s.panes.difference_max, 0.005f, 1.0f,
                            "%.3f of white", kLogarithmic);
-        tip("mean absolute difference of the three channels");
+        tip("The mean absolute difference of the three channels that gets the hottest colour");
     }
     const std::vector<std::string> names = pane_names(s);
     for (size_t i = 0; i < s.panes.psnr_db.size() && i + 1 < names.size(); ++i)
         ImGui::TextUnformatted(pane_label(s, names, i + 1).c_str());
 }
 
-// Over the picture: the stroke that selects, the gizmo, and toasts that say what happened.
+// What lies over the picture: the stroke that selects, the gizmo, and toasts that report what
+// happened.
 
 namespace {
 
@@ -222,7 +224,7 @@ void draw_tools(const Session& s, int width, int height) {
     draw_gizmo(s, camera);
 }
 
-// The latest lowest, in the middle of what the panel leaves free.
+// The latest message is the lowest, in the middle of the free area.
 void draw_toasts(const Session& s) {
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     const float gap = kToastGap * s.gui_scale, left = panel_width(s);

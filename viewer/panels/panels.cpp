@@ -13,9 +13,10 @@ namespace darb {
 
 namespace {
 
-constexpr float kWidth = 340;       // px at scale 1
-constexpr float kMargin = 8;        // px
-constexpr double kLeastFree = 0.4;  // of the width: less room beside the panel is not used alone
+constexpr float kWidth = 340;  // px at scale 1
+constexpr float kMargin = 8;   // px
+// share of the width: the room beside the panel is used alone only if it has this much
+constexpr double kLeastFree = 0.4;
 
 void progress_window(Session& s, float width, float height) {
     const WorkProgress& p = s.progress;
@@ -35,7 +36,7 @@ void progress_window(Session& s, float width, float height) {
     ImGui::SameLine();
     if (ImGui::Button("Cancel"))
         s.ask(loads ? Request(request::CancelLoad{}) : Request(request::CancelWork{}));
-    tip("key Esc");
+    tip("Esc");
     ImGui::End();
 }
 
@@ -51,10 +52,10 @@ void error_window(Session& s, float width, float height) {
     ImGui::PopStyleColor(2);
     ImGui::PushTextWrapPos(500 * s.gui_scale);
     ImGui::TextUnformatted(s.error.c_str());
-    if (s.scene) ImGui::TextDisabled("The scene before is still there.");
+    if (s.scene) ImGui::TextDisabled("The previous scene is still open.");
     ImGui::PopTextWrapPos();
     if (ImGui::Button("Close")) s.error.clear();
-    tip("key Esc");
+    tip("Esc");
     ImGui::End();
 }
 
@@ -63,18 +64,18 @@ void leaving_window(Session& s, float width, float height) {
     ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), 0, ImVec2(0.5f, 0.5f));
     ImGui::Begin("Not saved", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
-    ImGui::TextUnformatted("The scene was edited and is not saved.");
+    ImGui::TextUnformatted("The edits of this scene have not been saved.");
     path_field("file", s.save_file);
-    tip("its ending says in which format");
+    tip("The ending of the name decides the format");
     const bool quit = s.leaving->quit;
     if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.ask(request::SaveAndLeave{});
-    tip("to the file above");
+    tip("Save to the file above first");
     ImGui::SameLine();
     if (ImGui::Button(quit ? "Quit" : "Open")) s.ask(request::Leave{});
-    tip("what was edited is lost");
+    tip("The edits are lost");
     ImGui::SameLine();
     if (ImGui::Button("Stay")) s.ask(request::Stay{});
-    tip("key Esc");
+    tip("Esc");
     ImGui::End();
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The sections of the side panel, each one function; and helpers that they share.
+// The sections of the side panel, one function each, and helpers that they share.
 #pragma once
 
 #include <imgui.h>
@@ -8,7 +8,7 @@
 
 namespace darb {
 
-/// Ctrl+click types a value into a slider: it, too, is cut to the range.
+/// Ctrl+click types a value into a slider; this flag limits that value to the range, too.
 inline constexpr ImGuiSliderFlags kClamped = ImGuiSliderFlags_AlwaysClamp;
 inline constexpr ImGuiSliderFlags kLogarithmic =
     ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp;
@@ -22,20 +22,21 @@ void effects_panel(Session& session);
 void edit_panel(Session& session);
 void path_panel(Session& session);
 void training_panel(Session& session);
-/// All keys, where they are asked for.
+/// Lists all keys where the user asked for them.
 void help_window(Session& session);
 
-/// What the control before does, shown where the pointer rests on it.
+/// Explains the control before it while the pointer rests on it.
 void tip(const char* text);
 
-/// Lines between panes, which can be dragged, and what each pane is; in ImGui's coordinates.
+/// The lines between panes, which can be dragged, and the titles of the panes, in ImGui's
+/// coordinates.
 void draw_panes(Session& session);
 /// The tool's stroke and gizmo.
 void draw_tools(const Session& session, int width, int height);
-/// What happened, for some seconds.
+/// Shows messages for some seconds.
 void draw_toasts(const Session& session);
 void open_window(Session& session);
-/// Which kernels are side by side.
+/// Chooses which kernels are side by side.
 void panes_panel(Session& session);
 
 /// The region's outline over the picture, in ImGui's coordinates.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is open, and how it is displayed.
+// The scene that is open, and how it is displayed.
 #include <imgui.h>
 #include <string>
 #include <vector>
@@ -25,13 +25,13 @@ void kernel_choice(Session& s) {
         }
         ImGui::EndCombo();
     }
-    tip("the profile that all splats are drawn with");
+    tip("The profile with which all splats are drawn");
     int footprint = d.footprint == Footprint::exact ? 1 : 0;
     ImGui::BeginDisabled(!has_exact_footprint(d.kernel));
     if (ImGui::Combo("footprint", &footprint, "psi\0exact\0"))
         d.footprint = footprint == 1 ? Footprint::exact : Footprint::psi;
     ImGui::EndDisabled();
-    tip("how a splat is projected: psi, a fitted Gaussian-like curve, or the exact line integral "
+    tip("How a splat is projected: psi, a fitted Gaussian-like curve, or the exact line integral "
         "where the kernel has one");
     if (!s.scene) return;
     const SplatModel& m = s.scene->model;
@@ -43,7 +43,7 @@ void kernel_choice(Session& s) {
         d.kernel = m.kernel;
         d.footprint = m.footprint;
     }
-    tip("kernel and footprint of the file");
+    tip("Use the kernel and the footprint of the file");
 }
 
 }  // namespace
@@ -51,7 +51,7 @@ void kernel_choice(Session& s) {
 void scene_panel(Session& s) {
     if (!s.training.live || s.training.finished) {
         if (ImGui::Button("Open ...")) s.ask(request::ShowOpen{});
-        tip("a scene of a folder, or one that was opened before, Ctrl+O");
+        tip("Choose a scene in a folder, or one that was opened before (Ctrl+O)");
     }
     if (!s.scene || !ImGui::CollapsingHeader("Scene", ImGuiTreeNodeFlags_DefaultOpen)) return;
     const Scene& scene = *s.scene;
@@ -74,29 +74,32 @@ void display_panel(Session& s) {
         }
         ImGui::EndCombo();
     }
-    tip("the picture; its error to the photo, as heat; depth, near is light; or how many splats "
-        "each pixel takes");
+    tip("The picture; its error against the photo, as heat; the depth, where near is light; or how "
+        "many splats "
+        "each pixel needs");
     if (d.mode == VIEW_ERROR) {
         ImGui::SliderFloat("hottest at", &d.error_max, 0.02f, 1.0f, "%.2f of white", kLogarithmic);
-        tip("mean absolute difference of the three channels");
+        tip("The mean absolute difference of the three channels that gets the hottest colour");
     }
     if (d.mode == VIEW_COUNT) {
         ImGui::SliderFloat("hottest at", &d.count_max, 10, 10'000, "%.0f splats", kLogarithmic);
-        tip("of a pixel's list, until it is opaque");
+        tip("The number of splats per pixel, counted until it is opaque, that gets the hottest "
+            "colour");
     }
     if (s.scene) {
         int style = static_cast<int>(d.style);
         if (ImGui::Combo("splats as", &style, "splats\0points\0ellipsoids\0"))
             d.style = static_cast<SplatStyle>(style);
-        tip("as they are; dots at their centres; or hard ellipses of two standard deviations");
+        tip("Splats as they are, dots at their centres, or hard ellipses of two standard "
+            "deviations");
     }
     kernel_choice(s);
     panes_panel(s);
     ImGui::ColorEdit3("background", &d.background.x);
-    tip("sRGB, what is seen where no splat is");
+    tip("The colour where there is no splat, sRGB");
 }
 
-// The open dialog: a folder's scenes, and those that were opened last.
+// The open dialog: the scenes of a folder, and those that were opened last.
 
 namespace {
 
@@ -115,7 +118,7 @@ void choose(const fs::path& file, Session& s) {
 void recent_scenes(Session& s) {
     OpenDialog& dialog = s.open_dialog;
     if (dialog.recent.empty()) return;
-    ImGui::TextDisabled("opened last");
+    ImGui::TextDisabled("recently opened");
     for (std::size_t i = 0; i < dialog.recent.size(); ++i) {
         const fs::path file = dialog.recent[i];
         ImGui::PushID(static_cast<int>(i));
@@ -130,7 +133,8 @@ void recent_scenes(Session& s) {
 
 void folder_entries(Session& s) {
     OpenDialog& dialog = s.open_dialog;
-    const std::vector<FolderEntry> entries = dialog.entries;  // a choice changes them
+    // a copy, as a choice changes the dialog's
+    const std::vector<FolderEntry> entries = dialog.entries;
     for (const FolderEntry& entry : entries) {
         const std::string label = entry.folder ? entry.name + "/" : entry.name;
         if (!ImGui::Selectable(label.c_str())) continue;
@@ -139,7 +143,7 @@ void folder_entries(Session& s) {
         else
             choose(dialog.folder / entry.name, s);
     }
-    if (entries.empty()) ImGui::TextDisabled("no folder and no scene is in here");
+    if (entries.empty()) ImGui::TextDisabled("This folder has no scene and no other folder");
 }
 
 }  // namespace
@@ -162,12 +166,12 @@ void open_window(Session& s) {
     ImGui::Begin(dialog.merges ? "Merge a scene###open" : "Open a scene###open", &dialog.shown,
                  ImGuiWindowFlags_NoCollapse);
     if (ImGui::Button("Up")) go_to(dialog.folder.parent_path(), dialog);
-    tip("the folder above");
+    tip("Go to the parent folder");
     ImGui::SameLine();
     fs::path typed = dialog.folder;
     ImGui::SetNextItemWidth(-FLT_MIN);
     path_field("##folder", typed);
-    tip("a folder; type or paste");
+    tip("The folder; type or paste a path");
     if (typed != dialog.folder) go_to(typed, dialog);
     ImGui::BeginChild("entries", ImVec2(0, 0), true);
     recent_scenes(s);
@@ -176,12 +180,12 @@ void open_window(Session& s) {
     ImGui::End();
 }
 
-// The list of keys and what the mouse does.
+// The list of keys, and what the mouse does.
 
 namespace {
 
 struct HelpRow {
-    const char *input, *does;  // does: null where input is a heading
+    const char *input, *does;  // null where input is a heading
 };
 
 constexpr HelpRow kHelp[] = {
@@ -189,29 +193,29 @@ constexpr HelpRow kHelp[] = {
     {"left drag", "orbit"},
     {"right drag", "look around"},
     {"middle or Shift+left drag", "pan"},
-    {"wheel", "zoom; in flight, speed"},
-    {"double click", "orbit around this"},
+    {"wheel", "zoom, or change the speed while flying"},
+    {"double click", "orbit around this point"},
     {"W A S D Q E", "fly"},
     {"F, L", "frame all, level"},
     {"[ and ]", "cameras of the data set"},
     {"Pictures", nullptr},
-    {"drag a line", "border between photo and kernels"},
+    {"drag a line", "move the border between photo and kernels"},
     {"P", "save a picture"},
     {"K, space", "add a key frame, play the path"},
-    {"space, .", "in training: pause, one step"},
+    {"space, .", "during training: pause, do one step"},
     {"Editing", nullptr},
-    {"1", "left drag orbits again"},
+    {"1", "orbit with the left button again"},
     {"2, 3, 4, 5", "select: rectangle, lasso, brush, sphere"},
     {"6, 7, 8", "move, turn, scale"},
     {"Shift, Ctrl while selecting", "add, take away"},
-    {"Ctrl+A, Ctrl+D, Ctrl+I", "select all, nothing, the others"},
-    {"Ctrl+H, Ctrl+U", "hide the selection, show what is hidden"},
+    {"Ctrl+A, Ctrl+D, Ctrl+I", "select all, none, or the others"},
+    {"Ctrl+H, Ctrl+U", "hide the selection, show everything hidden"},
     {"Delete", "delete the selection"},
     {"Ctrl+Z, Ctrl+Y", "undo, redo"},
     {"Ctrl+S, Ctrl+Q", "save, quit"},
     {"Ctrl+O, or drop a file", "open a scene"},
     {"Window", nullptr},
-    {"?, H, F11", "these keys, panels, full screen"},
+    {"?, H, F11", "show these keys, hide the panels, full screen"},
     {"Esc", "stop, cancel, close, leave full screen"},
 };
 

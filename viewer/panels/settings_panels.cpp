@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Accuracy settings and effects as switches, each choice with its measured time and error beside
-// it, each effect with the reason that the plan gives.
+// Accuracy settings and effects as switches. Each choice has its measured time and error beside it,
+// and each effect has the plan's reason.
 #include <imgui.h>
 #include <algorithm>
 #include <cmath>
@@ -33,8 +33,8 @@ void choices(Session& s, int row) {
     for (const std::string& name : row_choices(row, s.sh_degree)) {
         if (ImGui::RadioButton(name.c_str(), chosen(row, s.display) == choice))
             choose(row, choice, s.display);
-        tip("time on the device, ms, and PSNR to the exact picture, dB, stand beside it once "
-            "measured");
+        tip("Once measured, the device time in ms and the PSNR against the exact picture in dB "
+            "stand beside it");
         const std::string text = measured_text(s, row, choice++);
         if (text.empty()) continue;
         ImGui::SameLine(130 * s.gui_scale);
@@ -45,8 +45,8 @@ void choices(Session& s, int row) {
 
 void measure_button(Session& s) {
     if (ImGui::Button("Measure here")) s.ask(request::Measure{});
-    tip("draws the picture with each choice: its time on the device, ms, and the error of the "
-        "8-bit picture against the exact one, dB");
+    tip("Draw the picture with each choice and measure its device time in ms and the error of the "
+        "8-bit picture against the exact one in dB");
 }
 
 }  // namespace
@@ -68,7 +68,7 @@ void effects_panel(Session& s) {
     measure_button(s);
     if (s.plan) {
         if (ImGui::Button("As planned")) s.ask(request::FollowPlan{});
-        tip("each effect on or off as darb plan says");
+        tip("Switch each effect on or off as darb plan recommends");
     }
     for (int effect = 0; effect < EFFECT_COUNT; ++effect) {
         const int row = effect_row(effect);
@@ -89,29 +89,29 @@ void effects_panel(Session& s) {
     ImGui::PopID();
 }
 
-// Camera: up axis, field of view, cameras of the data set, comparison with the photo.
+// The camera: up axis, field of view, cameras of the data set, comparison with the photo.
 
 namespace {
 
 void up_axis(Session& s) {
     Navigation& n = s.navigation;
     if (s.up_is_guess)
-        ImGui::Text("up: %s, a guess. On its head? Flip it:", up_name(n.up).c_str());
+        ImGui::Text("up: %s, a guess. Upside down? Flip it:", up_name(n.up).c_str());
     else
         ImGui::Text("up: %s (kept with --up %s)", up_name(n.up).c_str(), up_name(n.up).c_str());
     if (ImGui::Button("Flip")) n.set_up(-n.up);
-    tip("the scene stands on its head: turn it over; remembered for the file");
+    tip("Turn the scene over if it is upside down; this is remembered for the file");
     for (int axis = 0; axis < 3; ++axis) {
         ImGui::SameLine();
         constexpr const char* kNames[] = {"X up", "Y up", "Z up"};
         glm::dvec3 up(0.0);
         up[axis] = 1;
         if (ImGui::Button(kNames[axis])) n.set_up(up);
-        tip("this axis of the file points up; remembered for the file");
+        tip("Make this axis of the file point up; this is remembered for the file");
     }
     ImGui::SameLine();
     if (ImGui::Button("Level")) n.level();
-    tip("takes the roll away, key L");
+    tip("Remove the camera's roll (L)");
 }
 
 void data_set(Session& s) {
@@ -128,13 +128,13 @@ void data_set(Session& s) {
         }
         ImGui::EndCombo();
     }
-    tip("look through a camera of the data set; keys [ and ] go to the next");
+    tip("Look through a camera of the data set; [ and ] step through them");
     if (p.current < 0) {
         ImGui::TextDisabled("[ and ] step through its cameras");
         return;
     }
     if (ImGui::Checkbox("photo beside the picture", &p.compare)) p.failed = false;
-    tip("the photo left of a line that can be dragged");
+    tip("Show the photo left of a line that can be dragged");
 }
 
 }  // namespace
@@ -142,28 +142,29 @@ void data_set(Session& s) {
 void camera_panel(Session& s) {
     if (!ImGui::CollapsingHeader("Camera", ImGuiTreeNodeFlags_DefaultOpen)) return;
     if (ImGui::Button("Frame all")) s.ask(request::FrameAll{});
-    tip("the whole scene beside this panel, key F");
+    tip("Show the whole scene beside this panel (F)");
     ImGui::SameLine();
     if (ImGui::Button("Take picture")) s.ask(request::TakePicture{});
-    tip("writes darb_001.png, or the next that is free, to the current folder, key P");
+    tip("Write darb_001.png, or the next free name, to the current folder (P)");
     if (s.photos.current < 0) {
         float degrees = static_cast<float>(glm::degrees(s.navigation.fov_y));
         if (ImGui::SliderFloat("field of view", &degrees, 10, 120, "%.0f°", kClamped))
             s.navigation.fov_y = glm::radians(static_cast<double>(degrees));
-        tip("over the whole height of the window, degrees");
+        tip("The angle over the whole height of the window, in degrees");
         float speed = static_cast<float>(s.fly_speed);
         if (ImGui::DragFloat("fly speed", &speed, 0.01f * std::max(speed, 0.01f), 1e-4f, 1e4f,
                              "%.3g units/s", kClamped))
             s.fly_speed = speed;
-        tip("of W A S D Q E, in units of the scene a second; the wheel changes it in flight");
+        tip("Speed of the keys W A S D Q E, in units of the scene a second; the wheel changes it "
+            "while flying");
         up_axis(s);
     }
     ImGui::SliderFloat("near", &s.display.near_plane, 0.001f, 10, "%.3f units", kLogarithmic);
-    tip("what is nearer to the camera is not drawn, in units of the scene");
+    tip("Splats nearer to the camera are not drawn; in units of the scene");
     data_set(s);
 }
 
-// Frames per second in motion, milliseconds of each pass.
+// Frames per second in motion, and the milliseconds of each pass.
 
 void performance_panel(Session& s) {
     if (!ImGui::CollapsingHeader("Performance")) return;
@@ -190,21 +191,21 @@ void performance_panel(Session& s) {
     if (!t.passes.empty()) ImGui::Text("%7.2f ms on the device", total);
 }
 
-// Camera paths: key frames, play, export.
+// Camera paths: key frames, playing, export.
 
 void path_panel(Session& s) {
     if (!ImGui::CollapsingHeader("Camera path")) return;
     PathState& p = s.path;
     ImGui::Text("%zu key frames, %.1f s", p.path.keys.size(), p.path.duration());
     if (ImGui::Button("Add")) p.path.add(s.navigation, p.seconds_per_key);
-    tip("a key frame where the camera is, key K");
+    tip("Add a key frame at the camera's position (K)");
     ImGui::SameLine();
     ImGui::BeginDisabled(p.path.keys.empty());
     if (ImGui::Button("Remove last")) p.path.keys.pop_back();
-    tip("the key frame that was added last");
+    tip("Remove the key frame that was added last");
     ImGui::SameLine();
     if (ImGui::Button(p.playing ? "Stop" : "Play")) p.playing = !p.playing;
-    tip("flies along the path, key space");
+    tip("Fly along the path (space)");
     float at = static_cast<float>(p.at_s);
     if (ImGui::SliderFloat("time", &at, 0, static_cast<float>(std::max(p.path.duration(), 0.01)),
                            "%.2f s", kClamped) &&
@@ -213,34 +214,34 @@ void path_panel(Session& s) {
         s.ask(request::LeavePhoto{});
         apply(p.path.sample(at), s.navigation);
     }
-    tip("where on the path the camera is, seconds");
+    tip("The camera's place on the path, in seconds");
     ImGui::EndDisabled();
     ImGui::SliderFloat("per key frame", &p.seconds_per_key, 0.2f, 10, "%.1f s", kClamped);
-    tip("from the key frame before to the one that is added next");
+    tip("Time from the last key frame to the one that is added next");
     path_field("path file", p.file);
-    tip("JSON; darb render --path and darb view --path read it, too");
+    tip("A JSON file that darb render --path and darb view --path read, too");
     if (ImGui::Button("Load")) s.ask(request::LoadPath{});
-    tip("the key frames of the path file, in the place of these");
+    tip("Replace the key frames by those of the path file");
     ImGui::SameLine();
     ImGui::BeginDisabled(p.path.keys.empty());
     if (ImGui::Button("Save path")) s.ask(request::SavePath{});
-    tip("these key frames, to the path file");
+    tip("Write the key frames to the path file");
     path_field("folder", p.folder);
-    tip("of the exported frames; made where it is missing");
+    tip("The folder of the exported frames; it is made if it does not exist");
     ImGui::SliderInt("frames", &p.fps, 1, 120, "%d a second", kClamped);
-    tip("of the exported video");
+    tip("Frame rate of the exported video");
     int size[2] = {p.export_width, p.export_height};
     if (ImGui::InputInt2("size, px", size)) {
         p.export_width = std::clamp(size[0], 16, 8192);
         p.export_height = std::clamp(size[1], 16, 8192);
     }
-    tip("width and height of the exported frames, px");
+    tip("Width and height of the exported frames, px");
     if (ImGui::Button("Export frames and video")) s.ask(request::ExportPath{});
-    tip("PNG frames, and video.mp4 where ffmpeg is installed");
+    tip("Write PNG frames, and video.mp4 if ffmpeg is installed");
     ImGui::EndDisabled();
 }
 
-// A training run that is followed live: curves, pause, step.
+// A training run that is followed live: its curves, pausing, single steps.
 
 namespace {
 
@@ -261,17 +262,17 @@ void training_panel(Session& s) {
     if (!t.live || !ImGui::CollapsingHeader("Training", ImGuiTreeNodeFlags_DefaultOpen)) return;
     ImGui::Text("iteration %d of %d", t.iteration, t.last_iteration);
     ImGui::BeginDisabled(t.finished);
-    if (ImGui::Button(t.paused ? "Go on" : "Pause")) t.paused = !t.paused;
-    tip("the training, key space");
+    if (ImGui::Button(t.paused ? "Continue" : "Pause")) t.paused = !t.paused;
+    tip("Pause or continue the training (space)");
     ImGui::SameLine();
     if (ImGui::Button("Step")) {
         t.paused = true;
         ++t.steps_to_go;
     }
-    tip("one iteration, then a pause, key .");
+    tip("Train one iteration, then pause (.)");
     ImGui::EndDisabled();
     ImGui::SameLine();
-    ImGui::TextDisabled(t.finished ? "finished" : "closing goes on training");
+    ImGui::TextDisabled(t.finished ? "finished" : "closing leaves it running");
     ImGui::PushID("curves");
     curve("loss", t.loss, "%.4f", s.gui_scale);
     curve("PSNR", t.psnr_db, "%.2f dB", s.gui_scale);
