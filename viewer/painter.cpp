@@ -59,8 +59,8 @@ Painter::~Painter() {
 void Painter::open(const Scene& scene) {
     picture_.set_scene(scene.model, scene.bounds, scene.important);
     under_way_.clear();
-    psnr_at_ = 0;
-    warm_up_.reset();
+    copies_.at = 0;
+    warm_up_.thread.reset();
     lose_scene("another scene was opened");
     begin_motion();
     shown_model_ = shown_edit_ = 0;
@@ -77,7 +77,7 @@ void Painter::begin_motion() {
 void Painter::begin_scene(bool of_run) {
     constexpr int kSize = 256;  // px
     if (of_run && options_.second_device && live_.size.x > 0)
-        warm_up_ = std::make_unique<WarmUp>(
+        warm_up_.thread = std::make_unique<WarmUp>(
             *device_, *options_.second_device, session_->scene->model, shown_displays(),
             session_->navigation.camera(kSize, kSize), options_.wake);
     else
@@ -85,8 +85,8 @@ void Painter::begin_scene(bool of_run) {
 }
 
 void Painter::end_warm_up() {
-    warm_pipelines_ = warm_up_->take_pipelines();
-    warm_up_.reset();
+    warm_up_.pipelines = warm_up_.thread->take_pipelines();
+    warm_up_.thread.reset();
     live_.size = {0, 0};
     pacing_.forget();
 }
@@ -154,8 +154,8 @@ void Painter::begin(int width, int height) {
     take_results();
     take_psnr();
     take_levels();
-    if (warm_up_ && warm_up_->done()) end_warm_up();
-    if (at_rest()) warm_pipelines_.clear();  // the pictures own them now
+    if (warm_up_.thread && warm_up_.thread->done()) end_warm_up();
+    if (at_rest()) warm_up_.pipelines.clear();  // the pictures own them now
     canvas_.resize(width, height);
     gui_.begin(width, height);
 }
@@ -165,11 +165,11 @@ void Painter::paint(const PaintedFrame& frame) {
     step_work();
     if (!frame.of_run) load_current_photo();  // for a run, whoever draws reads it
     pacing_.skip();
-    if (!frame.of_run && !picture_.empty() && !warm_up_) pace_picture(frame, works);
+    if (!frame.of_run && !picture_.empty() && !warm_up_.thread) pace_picture(frame, works);
 }
 
 double Painter::seconds_to_next() {
-    if (!under_way_.empty() || psnr_at_ > 0) return 0;
+    if (!under_way_.empty() || copies_.at > 0) return 0;
     if (pacing_.missed() && !picture_.empty()) return 0;
     if (pacing_.rehearses() && rehearsals_ > 0) return 0;
     const double refine_s = pacing_.seconds_to_refine(frame_start_);
@@ -183,16 +183,16 @@ bool Painter::refined() const {
 }
 
 bool Painter::at_rest() const {
-    return !warm_up_ && under_way_.empty() && pacing_.is_whole() && ready_to_move() &&
+    return !warm_up_.thread && under_way_.empty() && pacing_.is_whole() && ready_to_move() &&
            rehearsals_ == 0;
 }
 
 void Painter::compose() {
     const auto strips = [this](Commands& commands) {
         if (shows_panes_) panes_.record(commands, session_->panes);
-        if (std::exchange(copies_wanted_, false)) {
+        if (std::exchange(copies_.wanted, false)) {
             panes_.record_copies(commands);
-            psnr_at_ = frame_ + kFramesUnderWay;
+            copies_.at = frame_ + kFramesUnderWay;
         }
     };
     live_.composed = true;
@@ -295,7 +295,7 @@ void Painter::fit_panes() {
 }
 
 BufferPicture Painter::shown() const {
-    if ((picture_.empty() || warm_up_) && live_.size.x > 0)
+    if ((picture_.empty() || warm_up_.thread) && live_.size.x > 0)
         return {&live_.buffers[live_.at], live_.size.x, live_.size.y};
     return drawn();
 }
@@ -322,8 +322,8 @@ void Painter::draw_picture(const PictureKey& key, PictureStep step, bool wait) {
         wish_for(camera, area, whole ? std::nullopt : std::optional(quality.splats));
     Started started{.frame = frame_, .step = step, .quality = quality, .made = {}};
     session_->panes.psnr_db.clear();
-    copies_wanted_ = false;
-    psnr_at_ = 0;
+    copies_.wanted = false;
+    copies_.at = 0;
     if (!make_picture(wish, started, wait)) return pacing_.failed();
     session_->times.quality = quality;
     started.refines = refines;
@@ -343,7 +343,7 @@ bool Painter::make_picture(const PaneWish& wish, Started& started, bool wait) {
     return session_->attempt([&] {
         if (!wait) {
             panes_.start(frame_, picture_, wish);
-            copies_wanted_ = whole_panes;
+            copies_.wanted = whole_panes;
             return;
         }
         panes_.render(picture_, wish);
@@ -414,9 +414,9 @@ void Painter::note_picture(const Started& started, double ms) {
 }
 
 void Painter::take_psnr() {
-    if (psnr_at_ == 0 || frame_ < psnr_at_) return;
+    if (copies_.at == 0 || frame_ < copies_.at) return;
     session_->panes.psnr_db = panes_.psnr_db();
-    psnr_at_ = 0;
+    copies_.at = 0;
     pacing_.unsettle();
 }
 
@@ -480,8 +480,8 @@ std::optional<ImageU8> Painter::picture_alone(int width, int height, bool of_run
 
 void Painter::start_export() {
     const PathState& p = session_->path;
-    work_.start_export(p.path,
-                       {p.folder, p.fps, p.export_width, p.export_height, session_->display});
+    work_.start_export(
+        p.path, {p.folder, p.fps, p.export_width, p.export_height, false, session_->display});
 }
 
 void Painter::start_measure(int width, int height) {

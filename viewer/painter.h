@@ -163,8 +163,10 @@ class Painter {
     PicturePacing pacing_;
     int frame_ = 0;                  // number of this one
     std::deque<Started> under_way_;  // in the order of their frames
-    bool copies_wanted_ = false;     // copy the panes' pictures with this frame
-    int psnr_at_ = 0;                // the frame in which the copies are there; 0: none are made
+    struct PaneCopies {              // of the panes' pictures, to compare them
+        bool wanted = false;         // copy with this frame
+        int at = 0;                  // the frame in which the copies are there; 0: none are made
+    } copies_;
     int rehearsals_ = 0;             // rehearsals of motion that are still to come
     double besides_picture_ms_ = 0;  // what an earlier frame took beside its picture
     PictureWork work_;
@@ -172,9 +174,11 @@ class Painter {
     std::vector<double> shares_;            // shares of the splats for motion, all below 1
     std::unique_ptr<MotionLevels> levels_;  // null: none asked for
     std::vector<std::unique_ptr<MotionLevels>> ended_;  // cancelled ones whose threads still run
-    std::unique_ptr<WarmUp> warm_up_;                   // while the run's last picture is shown
-    std::vector<Pipeline> warm_pipelines_;              // made by it, kept until pictures have them
-    int version_ = 0;                                   // counts changes of the scene and its edits
+    struct Warming {                                    // while the run's last picture is shown
+        std::unique_ptr<WarmUp> thread;                 // null: it is over
+        std::vector<Pipeline> pipelines;                // made by it, kept until pictures have them
+    } warm_up_;
+    int version_ = 0;         // counts changes of the scene and its edits
     bool highlights_ = true;  // whether the picture highlights the selection
     Clock::time_point frame_start_;
 };

@@ -18,6 +18,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
+#include "engine/data/panorama_files.h"
 #include "engine/data/video.h"
 
 namespace darb {
@@ -193,8 +194,9 @@ void PathExport::step(const Render& render, bool wait) {
     if (!has_frames()) {
         Navigation view;
         apply(path_.sample(double(next_) / options_.fps), view);
-        write_png(folder_.claim(frame_name(next_)),
-                  render(view.camera(options_.width, options_.height), options_.display));
+        const auto write = options_.panorama ? write_panorama_png : write_png;
+        write(folder_.claim(frame_name(next_)),
+              render(view.camera(options_.width, options_.height), options_.display));
         ++next_;
     } else if (ffmpeg_ < 0) {
         folder_.finish(frames_);
@@ -258,6 +260,7 @@ void PathExport::watch_video(bool wait) {
     ffmpeg_ = -1;
     done_ = true;
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+        if (options_.panorama) mark_panorama_video(folder_.path() / ExportFolder::kUnfinishedVideo);
         folder_.keep_video();
         summary_ += "; video " + (folder_.path() / ExportFolder::kVideo).string();
     } else {

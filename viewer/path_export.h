@@ -59,6 +59,7 @@ struct ExportOptions {
     std::filesystem::path folder;
     int fps = 30;               // frames a second, 1 at least
     int width = 0, height = 0;  // px of every frame
+    bool panorama = false;      // frames show all directions: the files say so
     DisplaySettings display;    // for every frame; without a photo there is no error to show
 };
 

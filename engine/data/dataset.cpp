@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <new>
 #include <numeric>
@@ -21,6 +23,7 @@
 #include "engine/data/run_colmap.h"
 #include "engine/data/source.h"
 #include "engine/data/video.h"
+#include "engine/scene/panorama.h"
 
 namespace darb {
 
@@ -270,6 +273,84 @@ void index_tracks(Dataset& dataset) {
     points.seen_begin = std::move(begin);
 }
 
+// "a/room.jpg" and "up" to "a/room@up.jpg".
+std::string name_of_face(const std::string& panorama, std::string_view face) {
+    const fs::path name = panorama;
+    return (name.parent_path() /
+            fmt::format("{}@{}{}", name.stem().string(), face, name.extension().string()))
+        .generic_string();
+}
+
+/// The views of a panorama by the place of its faces in the new order, or of another view by its
+/// own place alone.
+using PlacesOfFaces = std::array<std::uint32_t, kCubeFaces>;
+
+// A point that a panorama sees is in view of the face that looks its way. Where in it is not known.
+void move_tracks_to_faces(const std::vector<View>& before, const std::vector<PlacesOfFaces>& places,
+                          PointCloud& points) {
+    for (std::size_t p = 0; p + 1 < points.seen_begin.size(); ++p)
+        for (std::size_t k = points.seen_begin[p]; k < points.seen_begin[p + 1]; ++k) {
+            const View& view = before[points.seen_by[k]];
+            const PlacesOfFaces& to = places[points.seen_by[k]];
+            std::size_t face = 0;
+            if (view.lens.panorama()) {
+                const double* at = &points.position[3 * p];
+                const glm::dvec3 ray = view.camera.rotation * glm::dvec3(at[0], at[1], at[2]) +
+                                       view.camera.translation;
+                const auto along = [&](const CubeFace& f) { return (f.rotation * ray).z; };
+                face = static_cast<std::size_t>(std::ranges::max_element(cube_faces(), {}, along) -
+                                                cube_faces().begin());
+                if (points.has_tracks())
+                    points.seen_at[2 * k] = points.seen_at[2 * k + 1] =
+                        std::numeric_limits<float>::quiet_NaN();
+            }
+            points.seen_by[k] = to[face];
+        }
+}
+
+// Makes six views of each panorama.
+void cut_panoramas(Dataset& dataset) {
+    std::vector<View> before;
+    before.swap(dataset.views);
+    std::size_t depths = 0;
+    std::vector<std::pair<std::size_t, int>> sources;  // of the new views: view before, its face
+    for (std::size_t v = 0; v < before.size(); ++v) {
+        const View& view = before[v];
+        if (!view.lens.panorama()) {
+            dataset.views.push_back(view);
+            sources.emplace_back(v, 0);
+            continue;
+        }
+        depths += view.depth.empty() ? 0 : 1;
+        for (int f = 0; f < kCubeFaces; ++f) {
+            const CubeFace& face = cube_faces()[static_cast<std::size_t>(f)];
+            View& of_face = dataset.views.emplace_back(view);
+            of_face.face = f;
+            of_face.name = name_of_face(view.name, face.name);
+            of_face.depth.clear();
+            of_face.camera = face_camera(view.camera, face, 1);
+            sources.emplace_back(v, f);
+        }
+    }
+    if (dataset.views.size() == before.size()) return;
+    std::vector<std::uint32_t> order(dataset.views.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::ranges::stable_sort(order, {}, [&](std::uint32_t i) { return dataset.views[i].name; });
+    std::vector<View> sorted;
+    std::vector<PlacesOfFaces> places(before.size());
+    for (const std::uint32_t i : order) {
+        places[sources[i].first][static_cast<std::size_t>(sources[i].second)] =
+            static_cast<std::uint32_t>(sorted.size());
+        sorted.push_back(std::move(dataset.views[i]));
+    }
+    dataset.views = std::move(sorted);
+    move_tracks_to_faces(before, places, dataset.points);
+    if (depths > 0)
+        dataset.notes.push_back(fmt::format(
+            "Warning: the measured depths of {} are not read: depths are read of flat photos only.",
+            counted(depths, "panorama")));
+}
+
 // The distance within which a share of the points lies, judged by every step-th point.
 double distance_quantile(const PointCloud& points, const glm::dvec3& from, double share,
                          size_t step = 1) {
@@ -315,6 +396,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) try {
     if (options.hold_out)
         if (std::string note = mark_held_out(dataset.views, options.held_out); !note.empty())
             dataset.notes.push_back(std::move(note));
+    if (!options.whole_panoramas) cut_panoramas(dataset);
     fit_views(dataset, options);
     note_odd_cameras(dataset);
     note_coarse_points(dataset);

@@ -25,6 +25,8 @@ struct LensModel {
     std::vector<double> parameters;  // in COLMAP's order, px at full size
     int width = 0, height = 0;       // px at full size
     bool distorted() const;
+    /// EQUIRECTANGULAR: the photo shows all directions, and a view of it is one face of a cube.
+    bool panorama() const;
 };
 
 struct View {
@@ -41,6 +43,7 @@ struct View {
     LensModel lens;          // for the file on disk, turned by orientation; see load_photo
     bool is_test = false;    // held out
     bool in_arc = false;     // in the arc of HoldOut; is_test is set as well
+    int face = -1;           // of cube_faces(), where the photo is a panorama; else -1
     int orientation = 1;     // EXIF orientation that load_photo applies; 1 = as stored
     std::uint32_t source_id = 0;  // COLMAP's image id
 };
@@ -75,6 +78,7 @@ struct DatasetOptions {
     bool require_photos = true;           // false: cameras only (render)
     bool original_lens = false;           // leave photos distorted, and give cameras the lens
     bool original_where_wide = false;     // do so only for lenses that are too_wide_to_undistort
+    bool whole_panoramas = false;  // cameras only: a view a panorama, without face and intrinsics
 };
 
 /// The result of photo_detail().

@@ -9,12 +9,11 @@
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
+#include "engine/scene/panorama.h"
 
 namespace darb {
 
 namespace {
-
-constexpr std::string_view kPanorama = "EQUIRECTANGULAR";
 
 struct ModelRow {
     std::string_view name;
@@ -41,7 +40,7 @@ constexpr ModelRow kModels[] = {
     {"SIMPLE_FISHEYE", 3, true},
     {"FISHEYE", 4, false},
     {"EUCM", 0, false},
-    {kPanorama, 0, false},
+    {kPanorama, 2, false},
     {kFourRadial, 10, false},  // has no COLMAP id
 };
 
@@ -65,7 +64,25 @@ const ModelRow& model_of(const LensModel& lens) {
     return *row;
 }
 
+/// A panorama shows the whole sphere, so that it is twice as wide as high.
+void check_panorama(const LensModel& lens, const std::string& where) {
+    constexpr double kMostOff = 0.01;
+    const double width = lens.parameters[0], height = lens.parameters[1];
+    if (width != lens.width || height != lens.height)
+        throw Error(where,
+                    fmt::format("the panorama is {} x {} px, but its parameters say {:g} x {:g}",
+                                lens.width, lens.height, width, height),
+                    "Export the cameras again.");
+    if (std::abs(width / height - 2) > 2 * kMostOff)
+        throw Error(where,
+                    fmt::format("the panorama is {} x {} px, and one of all directions is twice as "
+                                "wide as high",
+                                lens.width, lens.height),
+                    "Use whole panoramas; mask what they do not show.");
+}
+
 std::string_view parameter_name(const ModelRow& row, std::size_t i) {
+    if (row.name == kPanorama) return i == 0 ? "w" : "h";
     constexpr std::string_view kOne[] = {"f", "cx", "cy"}, kTwo[] = {"fx", "fy", "cx", "cy"};
     if (i >= (row.one_focal ? 3 : 4)) return "of the distortion";
     return row.one_focal ? kOne[i] : kTwo[i];
@@ -83,8 +100,13 @@ int lens_parameter_count(std::string_view model) {
     return row ? row->parameters : -1;
 }
 
+bool LensModel::panorama() const {
+    return model == kPanorama;
+}
+
 bool LensModel::distorted() const {
     const ModelRow& row = model_of(*this);
+    if (panorama()) return true;
     if (model.ends_with("FISHEYE")) return true;
     if (model == "FOV") return std::abs(parameters[4]) > kSmallOmega;
     const auto first = parameters.begin() + (row.one_focal ? 3 : 4);
@@ -98,9 +120,7 @@ void check_lens(const LensModel& lens, const std::string& where) {
                     "Export the cameras with one of COLMAP's models.");
     if (row->parameters == 0)
         throw Error(where, fmt::format("the camera model {} is not read", lens.model),
-                    lens.model == kPanorama
-                        ? "Cut the panoramas into perspective photos and run colmap on those."
-                        : "Undistort with `colmap image_undistorter`, which writes PINHOLE.");
+                    "Undistort with `colmap image_undistorter`, which writes PINHOLE.");
     if (static_cast<int>(lens.parameters.size()) != row->parameters)
         throw Error(where,
                     fmt::format("{} has {} parameters, not {}", lens.model, row->parameters,
@@ -112,7 +132,7 @@ void check_lens(const LensModel& lens, const std::string& where) {
                         fmt::format("parameter {} of {} of the camera, {}, is not finite", i + 1,
                                     lens.parameters.size(), parameter_name(*row, i)),
                         "Calibrate the cameras again.");
-    for (int i = 0; i < (row->one_focal ? 1 : 2); ++i)
+    for (int i = 0; i < (row->one_focal ? 1 : 2) && !lens.panorama(); ++i)
         if (!(lens.parameters[static_cast<std::size_t>(i)] > 0))
             throw Error(where,
                         fmt::format("the focal length {} is not positive",
@@ -123,6 +143,7 @@ void check_lens(const LensModel& lens, const std::string& where) {
                     fmt::format("the photo size {} x {} is not between 1 and {}", lens.width,
                                 lens.height, kMaxSize),
                     "Correct the size, or export the cameras again.");
+    if (lens.panorama()) check_panorama(lens, where);
 }
 
 LensModel scale_lens(const LensModel& lens, int width, int height) {
@@ -137,7 +158,9 @@ LensModel scale_lens(const LensModel& lens, int width, int height) {
     LensModel scaled = lens;
     scaled.width = width;
     scaled.height = height;
-    if (row.one_focal) {  // sx and sy differ only by the rounding of the size
+    if (scaled.panorama()) {
+        scaled.parameters = {double(width), double(height)};
+    } else if (row.one_focal) {  // sx and sy differ only by the rounding of the size
         scaled.parameters[0] *= 0.5 * (sx + sy);
         scaled.parameters[1] *= sx;
         scaled.parameters[2] *= sy;
@@ -164,6 +187,8 @@ Camera pinhole_camera(const LensModel& model) {
 
 Lens::Lens(const LensModel& model) {
     const ModelRow& row = model_of(model);
+    if (model.panorama())
+        throw Error("lens", "a panorama is not one flat picture", "Use a face of it: cut_face.");
     const double* p = model.parameters.data();
     focal = row.one_focal ? glm::dvec2(p[0], p[0]) : glm::dvec2(p[0], p[1]);
     p += row.one_focal ? 1 : 2;
@@ -419,6 +444,10 @@ bool too_wide_to_undistort(const LensModel& model) {
 UndistortedFrame undistorted_frame(const LensModel& model, const std::string& where) {
     UndistortedFrame frame;
     Camera& camera = frame.camera;
+    if (model.panorama()) {
+        camera = face_camera({}, cube_faces()[0], face_size(model.width));
+        return frame;
+    }
     camera = pinhole_camera(model);
     if (!model.distorted()) return frame;
 

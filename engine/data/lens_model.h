@@ -21,6 +21,9 @@ namespace darb {
 /// nerfstudio's perspective camera, which COLMAP lacks: fx fy cx cy k1 k2 p1 p2 k3 k4, with all k
 /// in the numerator.
 constexpr std::string_view kFourRadial = "FOUR_RADIAL";
+/// COLMAP's panorama: its parameters are the width and height of the photo, and no Lens is made of
+/// it. See engine/scene/panorama.h.
+constexpr std::string_view kPanorama = "EQUIRECTANGULAR";
 /// COLMAP's name for a model id, 0 to 17; empty for other ids. check_lens knows which can be read.
 std::string_view lens_model_name(int id);
 /// The number of parameters; -1 for an unknown name, 0 for a model that cannot be read.

@@ -20,6 +20,7 @@
 #include "engine/data/dataset.h"
 #include "engine/data/image_io.h"
 #include "engine/data/source.h"
+#include "engine/scene/panorama.h"
 
 namespace darb {
 
@@ -106,7 +107,10 @@ ImageU8 decode_photo(const View& view) {
     if (!view.mask.empty())
         apply_mask(photo, turn_with_photo(read_image(view.mask, 1), view, view.mask, "masks"));
     if (view.crop_radius > 0) crop_to_circle(photo, view.crop_radius);
-    if (view.lens.distorted() && !view.camera.lens.active) {
+    if (view.face >= 0) {
+        photo = cut_face(photo, cube_faces().at(static_cast<std::size_t>(view.face)),
+                         face_size(photo.width));
+    } else if (view.lens.distorted() && !view.camera.lens.active) {
         const Camera full = undistorted_frame(view.lens, view.photo.string()).camera;
         photo = undistort(photo, view.lens, full);
     }

@@ -129,7 +129,8 @@ struct Tally {
     bool own_alpha = false;  // some photo has an alpha channel of its own
     bool masked = false;     // some photo has a mask, or a gap from undistortion
     std::size_t resized = 0, unturned = 0, undistorted = 0, too_wide = 0, downscaled = 0;
-    std::size_t narrower = 0;  // photos narrower than the requested width
+    std::size_t panoramas = 0;  // photos that were cut into faces
+    std::size_t narrower = 0;   // photos narrower than the requested width
     std::string resize_example;
     std::size_t unfit = 0;  // photos that cannot be used, where only cameras are wanted
     std::string unfit_example;
@@ -156,7 +157,7 @@ int choose_orientation(const ImageInfo& info, const LensModel& lens) {
 void compare_focal(const ImageInfo& info, const View& view, Tally& tally) {
     constexpr double kFilmDiagonal = 43.27, kMost = 1.6;  // mm
     if (info.focal_35mm <= 0 || view.lens.parameters.empty() || view.lens.width < 1 ||
-        view.lens.model.find("FISHEYE") != std::string::npos)
+        view.lens.model.find("FISHEYE") != std::string::npos || view.lens.panorama())
         return;
     const double said = info.focal_35mm / kFilmDiagonal * std::hypot(info.width, info.height) *
                         view.lens.width / (view.orientation >= 5 ? info.height : info.width);
@@ -263,6 +264,9 @@ void add_notes(const Tally& tally, const DatasetOptions& options, Dataset& datas
     if (tally.undistorted > 0)
         dataset.notes.push_back(
             fmt::format("Undistorted at load: {}.", counted(tally.undistorted, "photo")));
+    if (tally.panoramas > 0)
+        dataset.notes.push_back(fmt::format("Cut into the six faces of a cube at load: {}.",
+                                            counted(tally.panoramas, "panorama")));
     if (tally.too_wide > 0)
         dataset.notes.push_back(
             fmt::format("Kept with their fisheye lens, too wide for flat pictures: {}.",
@@ -356,14 +360,22 @@ void fit_views(Dataset& dataset, const DatasetOptions& options) {
         const auto [at, is_new] = frames.try_emplace({view.lens.model, std::move(key)});
         const bool kept_as_wide = !options.original_lens && options.original_where_wide &&
                                   too_wide_to_undistort(view.lens);
-        const bool original = options.original_lens || kept_as_wide;
+        const bool original = (options.original_lens || kept_as_wide) && !view.lens.panorama();
         if (is_new)
             at->second =
                 original ? original_frame(view.lens) : undistorted_frame(view.lens, view.name);
         tally.masked |= at->second.has_gaps;
         if (kept_as_wide) ++tally.too_wide;
-        if (view.lens.distorted() && !original) ++tally.undistorted;
+        if (view.lens.panorama()) {
+            tally.panoramas += view.face == 0 ? 1 : 0;
+        } else if (view.lens.distorted() && !original) {
+            ++tally.undistorted;
+        }
         set_intrinsics(view, at->second, options.resolution, tally);
+        if (view.lens.panorama() && view.face < 0) {
+            view.camera.width = view.lens.width;
+            view.camera.height = view.lens.height;
+        }
     }
     // A masked pixel must never be trained as background. Where a data set has both masks and an
     // alpha channel with transparent pixels, these are left out as well.

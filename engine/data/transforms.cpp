@@ -239,8 +239,30 @@ std::string model_name(const TransformsIntrinsics& in, const std::string& where)
         const bool distorted = in.k[0] != 0 || in.k[1] != 0 || in.p1 != 0 || in.p2 != 0;
         return distorted ? "OPENCV" : "PINHOLE";
     }
+    if (name == kPanorama) return std::string(kPanorama);
     throw Error(where, fmt::format("the camera_model {} cannot be read", in.camera_model),
-                "Use perspective or fisheye photos (OPENCV, OPENCV_FISHEYE, PINHOLE).");
+                "Use perspective or fisheye photos (OPENCV, OPENCV_FISHEYE, PINHOLE), or whole "
+                "panoramas (EQUIRECTANGULAR).");
+}
+
+/// A panorama needs no focal lengths. Its middle looks ahead, so a principal point elsewhere would
+/// turn it.
+LensModel panorama_lens(const TransformsIntrinsics& in, double w, double h,
+                        const std::string& where) {
+    if (std::abs(in.cx.value_or(0.5 * w) - 0.5 * w) > 1 ||
+        std::abs(in.cy.value_or(0.5 * h) - 0.5 * h) > 1)
+        throw Error(where,
+                    fmt::format("cx, cy = {:g}, {:g} is not the middle of the panorama of {:g} x "
+                                "{:g} px",
+                                in.cx.value_or(0.5 * w), in.cy.value_or(0.5 * h), w, h),
+                    "Leave cx and cy out, and turn transform_matrix instead.");
+    LensModel lens;
+    lens.model = kPanorama;
+    lens.width = static_cast<int>(std::lround(w));
+    lens.height = static_cast<int>(std::lround(h));
+    lens.parameters = {double(lens.width), double(lens.height)};
+    check_lens(lens, where);
+    return lens;
 }
 
 /// Keys that are read, and keys that change nothing here: bounding boxes and frames of other
@@ -394,7 +416,7 @@ class UnreadKeys {
             if (std::ranges::find(kOtherLenses, name) != std::end(kOtherLenses))
                 throw Error(where, fmt::format("{} declares a lens that is not read", key),
                             "Make perspective or fisheye photos of it (OPENCV, OPENCV_FISHEYE, "
-                            "PINHOLE).");
+                            "PINHOLE); a whole panorama has camera_model EQUIRECTANGULAR.");
             add(key);
         }
     }
@@ -579,6 +601,7 @@ LensModel lens_from_transforms(const TransformsIntrinsics& in, int width, int he
     if (!(w >= 1 && w <= 1e6 && h >= 1 && h <= 1e6))
         throw Error(where, fmt::format("the photo size {} x {} is not valid", w, h),
                     "Correct w and h.");
+    if (model_name(in, where) == kPanorama) return panorama_lens(in, w, h, where);
     const auto from_angle = [](double size, double angle) {
         return 0.5 * size / std::tan(0.5 * angle);
     };

@@ -225,14 +225,16 @@ EffectRow centre_rule(const std::vector<View>& views) {
 
 EffectRow lens_rule(const std::vector<View>& views) {
     EffectRow row;
-    std::size_t lenses = 0, distorted = 0, wide = 0;
+    std::size_t lenses = 0, distorted = 0, wide = 0, faces = 0;
     for (const View& view : views) {
         lenses += view.camera.lens.active ? 1 : 0;
-        distorted += view.lens.distorted() ? 1 : 0;
+        faces += view.face >= 0 ? 1 : 0;
+        distorted += view.lens.distorted() && view.face < 0 ? 1 : 0;
         wide += too_wide_to_undistort(view.lens) ? 1 : 0;
     }
-    const std::string too_wide =
+    std::string too_wide =
         wide > 0 ? fmt::format("; {} see more than 60 degrees to a side", wide) : "";
+    if (faces > 0) too_wide += fmt::format("; {} are faces of panoramas", faces);
     row.on = lenses > 0;
     row.measured = static_cast<double>(lenses);
     row.reason = "no cameras are named";

@@ -155,6 +155,69 @@ TEST_F(TrainedCommand, render_takes_every_kind_of_cameras) {
     }
 }
 
+TEST_F(TrainedCommand, render_shows_all_directions_and_train_takes_them) {
+    json cameras = json::parse(read_text_file(output() + "/cameras.json"));
+    cameras.erase(cameras.begin() + 4, cameras.end());
+    const std::string folder = scratch() / "around";
+    write_file_atomic(folder + "/cameras.json", cameras.dump());
+    const std::string render = fmt::format("render {} --cameras {}/cameras.json ", ply(), folder);
+    ASSERT_EQ(darb(render + "-o " + folder + "/flat").code, 0);
+    const Outcome o =
+        darb(render + "--projection equirectangular --size 512x256 -o " + folder + "/images");
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(o.out.find("off_centre"), std::string::npos) << o.out;
+    // The middle of the panorama is what the camera sees in its middle.
+    for (const char* name : {"view_00", "view_01", "view_02", "view_03"}) {
+        const ImageU8 flat = read_image(fmt::format("{}/flat/{}.png", folder, name));
+        const ImageU8 around = read_image(fmt::format("{}/images/{}.png", folder, name));
+        ASSERT_EQ(around.width, 512);
+        const auto mean = [](const ImageU8& image, int x0, int y0, int reach, int c) {
+            double sum = 0;
+            for (int y = -reach; y < reach; ++y)
+                for (int x = -reach; x < reach; ++x) sum += image.at(x0 + x, y0 + y, c);
+            return sum / (4 * reach * reach);
+        };
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(mean(flat, flat.width / 2, flat.height / 2, 4, c),
+                        mean(around, 256, 128, 3, c), 6)
+                << name;
+    }
+    ASSERT_EQ(darb(render + "--projection cubemap --size 64x64 -o " + folder + "/cube").code, 0);
+    EXPECT_EQ(count_png(folder + "/cube"), 24U);
+
+    json frames = json::array();
+    for (const json& camera : cameras) {
+        const json &r = camera["rotation"], &p = camera["position"];
+        json matrix = json::array();
+        for (std::size_t row = 0; row < 3; ++row)
+            matrix.push_back(
+                {r[row][0], -r[row][1].get<double>(), -r[row][2].get<double>(), p[row]});
+        matrix.push_back({0, 0, 0, 1});
+        frames.push_back({{"file_path", "images/" + camera["img_name"].get<std::string>() + ".png"},
+                          {"transform_matrix", matrix}});
+    }
+    write_file_atomic(folder + "/transforms.json",
+                      json{{"camera_model", "EQUIRECTANGULAR"}, {"frames", frames}}.dump());
+    const std::string again = folder + "/again";
+    ASSERT_EQ(darb(fmt::format("render {} --cameras {}/transforms.json --projection "
+                               "equirectangular --size 512x256 -o {}",
+                               ply(), folder, again))
+                  .code,
+              0);
+    EXPECT_EQ(read_image(again + "/images_view_02.png").data,
+              read_image(folder + "/images/view_02.png").data);
+    const Outcome run =
+        darb(fmt::format("train {0} -o {0}/run --iterations 8 --no-report -r 48 "
+                         "--start random --random-points 500",
+                         folder));
+    EXPECT_EQ(run.code, 0) << run.err;
+    EXPECT_NE(run.out.find("24 photos to train on"), std::string::npos) << run.out;
+    expect_refused({{render + "--projection equirectangular --size 300x200 -o x", "--size 400x200"},
+                    {render + "--projection equirectangular -r 2 -o x", "--size in place of -r"},
+                    {render + "--size 300x200 -o x", "sizes of their own"},
+                    {fmt::format("render {} --projection cubemap -o x", ply()), "--cameras"}});
+}
+
 TEST_F(TrainedCommand, frames_of_equal_names_are_kept_apart) {
     json cameras = json::parse(read_text_file(output() + "/cameras.json"));
     cameras.erase(cameras.begin() + 3, cameras.end());

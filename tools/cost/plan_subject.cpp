@@ -17,7 +17,8 @@ namespace darb {
 namespace {
 
 bool distorted(const Dataset& dataset) {
-    return std::ranges::any_of(dataset.views, [](const View& v) { return v.lens.distorted(); });
+    return std::ranges::any_of(
+        dataset.views, [](const View& v) { return v.lens.distorted() && !v.lens.panorama(); });
 }
 
 // As loaded, photos may have been straightened.

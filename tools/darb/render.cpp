@@ -24,10 +24,12 @@
 #include "engine/data/camera_list.h"
 #include "engine/data/image_io.h"
 #include "engine/data/metrics.h"
+#include "engine/data/panorama_files.h"
 #include "engine/gpu/device.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/raster/frame_view.h"
 #include "engine/render/renderer.h"
+#include "engine/scene/panorama.h"
 #include "engine/scene/stored_units.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/flags.h"
@@ -49,12 +51,15 @@ struct FilmFlags {
     double seconds = 6;    // time of one turn
 };
 
+constexpr const char *kPerspective = "perspective", *kEquirectangular = "equirectangular",
+                     *kCubemap = "cubemap";
+
 struct RenderFlags {
     std::filesystem::path scene, cameras, output;
     std::string device;
     bool white_background = false, quiet = false, force = false;
     std::optional<float> near_plane;  // world units
-    std::string effects = "auto";
+    std::string effects = "auto", projection = kPerspective;
     FilmFlags film;
     DepthFlags depth;
     DatasetOptions data;
@@ -70,6 +75,118 @@ void add_film_flags(CLI::App& command, FilmFlags& flags, CLI::Option* cameras);
 int render_film(const RenderFlags& flags, const Accuracy& accuracy, const EffectChoice& choice);
 
 namespace {
+
+double milliseconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+        .count();
+}
+
+constexpr const char *kPanoramaSize = "2048x1024", *kFaceSize = "1024x1024";
+
+bool shows_all_around(const RenderFlags& flags) {
+    return flags.projection != kPerspective;
+}
+
+// Of a panorama, or of a face of a cube map.
+PixelSize size_around(const RenderFlags& flags) {
+    const bool cube = flags.projection == kCubemap;
+    const PixelSize size = parse_size(!flags.film.size.empty() ? flags.film.size
+                                      : cube                   ? kFaceSize
+                                                               : kPanoramaSize);
+    if (size.width != (cube ? 1 : 2) * size.height)
+        throw Error(fmt::format("--size {}", flags.film.size),
+                    cube ? "a face of a cube map is as wide as high"
+                         : "a panorama is twice as wide as high",
+                    fmt::format("Give --size {}x{}.", (cube ? 1 : 2) * size.height, size.height));
+    return size;
+}
+
+void check_projection(const RenderFlags& flags) {
+    const bool around = shows_all_around(flags);
+    if (!around && !flags.cameras.empty() && !flags.film.size.empty())
+        throw Error("--size", "the cameras have sizes of their own",
+                    "Use -r, or leave --cameras out.");
+    if (!around) return;
+    const std::string what = "--projection " + flags.projection;
+    if (flags.projection == kCubemap && flags.cameras.empty())
+        throw Error(what, "is for single pictures", "Name --cameras, or take equirectangular.");
+    if (!flags.depth.format.empty())
+        throw Error(what, "has no depth beside it", "Leave --depth out.");
+    if (flags.data.resolution != -1)
+        throw Error(what, "shows all directions, whatever size the cameras have",
+                    "Use --size in place of -r.");
+    if (flags.data.original_lens) throw Error(what, "knows no lens", "Leave --lens out.");
+    size_around(flags);
+}
+
+/// Draws what a camera's place sees in all directions; how the camera is turned decides what is in
+/// the middle.
+class AllAround {
+  public:
+    AllAround(Renderer& renderer, EffectPlan& plan, const RenderFlags& flags, float near_plane)
+        : renderer_(renderer),
+          plan_(plan),
+          background_(flags.white_background ? 1.0f : 0.0f),
+          near_plane_(near_plane) {}
+
+    ImageF face(const Camera& pose, const CubeFace& face, int size, int margin) {
+        const ImageF image =
+            renderer_.render(face_camera(pose, face, size, margin), background_, -1, near_plane_);
+        plan_.note_frame(renderer_.status().huge_splats, renderer_.status().longest_list);
+        return image;
+    }
+    ImageU8 panorama(const Camera& pose, const PixelSize& size) {
+        std::array<ImageF, kCubeFaces> faces;
+        for (std::size_t f = 0; f < faces.size(); ++f)
+            faces[f] = face(pose, cube_faces()[f], face_size(size.width), kJoinMargin);
+        return to_8bit(join_faces(faces, size.width, size.height));
+    }
+
+  private:
+    Renderer& renderer_;
+    EffectPlan& plan_;
+    glm::vec3 background_;
+    float near_plane_;
+};
+
+// The pinholes that are drawn of these places, for the effects to be planned by.
+std::vector<View> faces_of(const std::vector<View>& views, const RenderFlags& flags) {
+    const PixelSize size = size_around(flags);
+    std::vector<View> faces;
+    for (const View& view : views)
+        for (const CubeFace& face : cube_faces()) {
+            View& of_face = faces.emplace_back(view);
+            of_face.camera =
+                face_camera(view.camera, face,
+                            flags.projection == kCubemap ? size.width : face_size(size.width));
+        }
+    return faces;
+}
+
+// room.png and a face to room_front.png.
+std::filesystem::path face_file(const std::filesystem::path& file, const CubeFace& face) {
+    std::filesystem::path of_face = file;
+    return of_face.replace_filename(fmt::format("{}_{}.png", file.stem().string(), face.name));
+}
+
+Paths files_around(const RenderFlags& flags, const std::vector<std::filesystem::path>& files) {
+    if (flags.projection != kCubemap) return files;
+    Paths all;
+    for (const auto& file : files)
+        for (const CubeFace& face : cube_faces()) all.push_back(face_file(file, face));
+    return all;
+}
+
+void draw_around(AllAround& around, const RenderFlags& flags, const Camera& pose,
+                 const std::filesystem::path& file) {
+    const PixelSize size = size_around(flags);
+    if (flags.projection != kCubemap) {
+        write_panorama_png(file, around.panorama(pose, size));
+        return;
+    }
+    for (const CubeFace& face : cube_faces())
+        write_png(face_file(file, face), to_8bit(around.face(pose, face, size.width, 0)));
+}
 
 // Applies -r to a camera list, which states sizes rather than photos: up to 8 is a divisor, above
 // it a width.
@@ -88,6 +205,8 @@ int render(RenderFlags flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     const EffectChoice choice = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     check_depth(flags.depth, accuracy, choice);
+    check_projection(flags);
+    flags.data.whole_panoramas = shows_all_around(flags);
     if (flags.cameras.empty()) return render_film(flags, accuracy, choice);
     SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, nullptr, flags.units));
     note_unused_choices(flags.accuracy, model.kernel);
@@ -98,7 +217,7 @@ int render(RenderFlags flags) {
     std::vector<std::filesystem::path> files;
     std::set<std::string> used;
     for (const View& view : views) files.push_back(flags.output / picture_name(view.name, used));
-    Paths outputs = files;
+    Paths outputs = files_around(flags, files);
     add_depth_files(flags.depth, files, outputs);
     refuse_to_overwrite_inputs(
         outputs, together({files_of(flags.scene), files_of(flags.cameras), files_of(views)}));
@@ -108,22 +227,28 @@ int render(RenderFlags flags) {
     Device device(device_options);
     settle_tuning(device, flags.tune);
     const float near_plane = flags.near_plane.value_or(static_cast<float>(NEAR_DEFAULT));
-    EffectPlan plan = plan_rendering(
-        model, views, {.depth = !flags.depth.format.empty(), .near_plane = near_plane}, choice);
+    EffectPlan plan =
+        plan_rendering(model, shows_all_around(flags) ? faces_of(views, flags) : views,
+                       {.depth = !flags.depth.format.empty(), .near_plane = near_plane}, choice);
     apply_plan(plan, model);
     apply_plan(plan, views);
     for (const View& view : views)
-        check_frame(device, view.camera.width, view.camera.height, view.name);
+        if (!shows_all_around(flags))
+            check_frame(device, view.camera.width, view.camera.height, view.name);
     Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
+    AllAround around(renderer, plan, flags, near_plane);
     DepthFiles depths(flags.depth);
     std::vector<double> frame_ms;
     for (const View& view : views) {
         const auto start = std::chrono::steady_clock::now();
+        if (shows_all_around(flags)) {
+            draw_around(around, flags, view.camera, files[frame_ms.size()]);
+            frame_ms.push_back(milliseconds_since(start));
+            continue;
+        }
         const ImageF image = renderer.render(view.camera, background, -1, near_plane);
-        const std::chrono::duration<double, std::milli> ms =
-            std::chrono::steady_clock::now() - start;
-        frame_ms.push_back(ms.count());
+        frame_ms.push_back(milliseconds_since(start));
         plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
         const auto& file = files[frame_ms.size() - 1];
         write_png(file, to_8bit(image));
@@ -151,6 +276,13 @@ void add_render(CLI::App& app, Action& action) {
         command->add_option("--cameras", flags->cameras,
                             "a cameras.json, a transforms.json, a camera_path.json of nerfstudio, "
                             "or a data set; photos are not needed");
+    command
+        ->add_option("--projection", flags->projection,
+                     "perspective: what the camera sees; equirectangular: all directions, as 360 "
+                     "viewers and players show them, 2048x1024 px without --size; cubemap: six "
+                     "pictures of 90 degrees, NAME_front and so on, 1024x1024 px")
+        ->check(CLI::IsMember({kPerspective, kEquirectangular, kCubemap}))
+        ->capture_default_str();
     add_film_flags(*command, flags->film, cameras);
     command->add_option("-o,--output", flags->output, "folder of the frames, made where missing")
         ->required();
@@ -327,9 +459,9 @@ void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
         "without it and --cameras the camera goes once around what the scene's cameras "
         "look at. Both make a video, too, where ffmpeg is");
     path->excludes(cameras);
-    c.add_option("--size", flags.size, "WIDTHxHEIGHT of a path's or a turn's frames, px")
-        ->default_str("nerfstudio's path: as it says, else 1280x720")
-        ->excludes(cameras);
+    c.add_option("--size", flags.size,
+                 "WIDTHxHEIGHT of the frames of a path, a turn or another --projection, px")
+        ->default_str("nerfstudio's path: as it says, else 1280x720");
     c.add_option("--fps", flags.fps, "their frames a second")
         ->check(CLI::Range(1, 240))
         ->default_str("nerfstudio's path: as it says, else 30")
@@ -359,7 +491,8 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
     CameraPath path;
     if (!flags.film.path.empty()) path = read_camera_path(flags.film.path);
     say_notes(path.notes);
-    const PixelSize size = film_size(flags.film, path);
+    const bool all_around = shows_all_around(flags);
+    const PixelSize size = all_around ? size_around(flags) : film_size(flags.film, path);
     SplatFile facts;
     SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, &facts, flags.units));
     note_unused_choices(flags.accuracy, model.kernel);
@@ -367,7 +500,7 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
-    check_frame(device, size.width, size.height, "--size");
+    if (!all_around) check_frame(device, size.width, size.height, "--size");
     const float near_plane =
         flags.near_plane ? *flags.near_plane : near_plane_for(scene_bounds(model));
     EffectPlan plan =
@@ -375,10 +508,13 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
     apply_plan(plan, model);
     Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
-    PathExport film(path, {flags.output, film_fps(flags.film, path), size.width, size.height, {}});
+    AllAround around(renderer, plan, flags, near_plane);
+    PathExport film(
+        path, {flags.output, film_fps(flags.film, path), size.width, size.height, all_around, {}});
     while (!film.done())
         film.step(
             [&](const Camera& camera, const DisplaySettings&) {
+                if (all_around) return around.panorama(camera, size);
                 const ImageF image = renderer.render(camera, background, -1, near_plane);
                 plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
                 return to_8bit(image);

@@ -35,11 +35,11 @@ CHANGES = [
     ("shaders/forward/project.comp", "vec3 colour = first_band(sh_dc[i]);", "vec3 colour = glow[i] + first_band(sh_dc[i]);"),
     ("shaders/backward/project_gradient.glsl", "vec3 colour = first_band(sh_dc",
      "vec3 colour = glow[i] + first_band(sh_dc"),
-    ("shaders/backward/project_backward.comp", "// Moments with UPDATE_ADAM, else gradients.\n",
+    ("shaders/backward/project_backward.comp", "// The moments with UPDATE_ADAM, otherwise the gradients.\n",
      "layout(set = 0, binding = 1 + ATTRIBUTE_GLOW, scalar) buffer Glow { float glow[]; };\n"
      "layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_GLOW, scalar) buffer MGlow { vec2 m_glow[]; };\n"
      "layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_GLOW, scalar) buffer DGlow { float d_glow[]; };\n"
-     "// Moments with UPDATE_ADAM, else gradients.\n"),
+     "// The moments with UPDATE_ADAM, otherwise the gradients.\n"),
     ("shaders/backward/project_backward.comp", "    if (UPDATE == UPDATE_ADAM && stands_near(",
      "    UPDATE_ATTRIBUTE(vec2, glow[i], m_glow[i], d_glow[i], g.colour.r + g.colour.g + g.colour.b, ATTRIBUTE_GLOW)\n"
      "    if (UPDATE == UPDATE_ADAM && stands_near("),

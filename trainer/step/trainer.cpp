@@ -70,7 +70,6 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
     : device_(&with_budget(device, schedule.options)),
       ranks_(ranks.all ? ranks : RankGroup{&alone_}),
       schedule_(schedule),
-      background_(schedule.options.white_background ? 1.0f : 0.0f),
       extent_(scene_extent(dataset)),
       memory_(device, dataset, schedule, static_cast<std::uint32_t>(start.size())),
       splats_(device, start_model(start, schedule.options), true, schedule_.rest_every > 1),
@@ -103,7 +102,7 @@ int Trainer::degree_at(int iteration) const {
 }
 
 glm::vec3 Trainer::background_for(int iteration) const {
-    if (!schedule_.options.random_background) return background_;
+    if (!schedule_.options.random_background) return background();
     Pcg32 random(schedule_.options.seed,
                  0x6261636Bull << 32 | static_cast<std::uint32_t>(iteration));
     glm::vec3 colour;
@@ -129,7 +128,7 @@ StepInput Trainer::input_for(int iteration, int view, int last) const {
 // Density control opens the next step rather than closing its own, so that what is evaluated and
 // saved between them is what was trained, not what was just reset.
 void Trainer::step() {
-    if (opened_ != iteration_) open_step();
+    if (turns_.opened != iteration_) open_step();
     if (ranks_.mixed && iteration_ / schedule_.batch % kStepsApart == 0) follow_first();
     set_resolution(iteration_ + 1);
     const int begin = iteration_;
@@ -184,13 +183,14 @@ std::optional<CameraMoves> Trainer::camera_moves() const {
 }
 
 void Trainer::open_step() {
-    if (controlled_ != iteration_) round_ = control_density();
-    controlled_ = iteration_;  // a probe that fails is tried again, the round before it is not
+    if (turns_.controlled != iteration_) turns_.round = control_density();
+    turns_.controlled =
+        iteration_;  // a probe that fails is tried again, the round before it is not
     update_smoothing();
     const bool probes = probe_.is_due(iteration_, splats_.sh_degree());
     if (probes) probe_degree();
-    opened_ = iteration_;
-    const std::optional<DensityResult> round = std::exchange(round_, std::nullopt);
+    turns_.opened = iteration_;
+    const std::optional<DensityResult> round = std::exchange(turns_.round, std::nullopt);
     if ((round || probes) && ranks_.mixed) follow_first();
     if (round && on_round) on_round(iteration_, *round);
 }
@@ -251,13 +251,13 @@ gpu::DensifyArgs Trainer::round_args(int iteration) const {
 
 // Of devices that round differently: the splats of the first are everybody's again.
 void Trainer::follow_first() {
-    const int opened = opened_, controlled = controlled_;
+    const int opened = turns_.opened, controlled = turns_.controlled;
     const Bytes bytes =
         ranks_.all->is_first() ? checkpoint_bytes({state(), "", "", 0, ""}) : Bytes{};
     const Bytes first = from_first(*ranks_.all, bytes);
     if (!ranks_.all->is_first()) restore(parse_checkpoint(first, "the first rank").state);
-    opened_ = opened;
-    controlled_ = controlled;
+    turns_.opened = opened;
+    turns_.controlled = controlled;
 }
 
 DensityResult Trainer::run_round(int iteration) {
@@ -333,7 +333,7 @@ void Trainer::probe_degree() {
     const ScopeGuard reports([&] { step_.on_finished = std::move(on_finished); });
     const ScopeGuard goes_on([&] {  // before that: it finishes what the trial left under way
         restore(tried);
-        controlled_ = iteration_;
+        turns_.controlled = iteration_;
     });
     const ProbeFork fork{
         .restore = [this](const State& start) { restore(start); },
@@ -349,7 +349,7 @@ void Trainer::probe_degree() {
         .photo_psnr =
             [this](int view) {
                 drain();
-                return psnr_of(step_.photo_mse(photos_.view(view, sh_degree(), background_)));
+                return psnr_of(step_.photo_mse(photos_.view(view, sh_degree(), background())));
             }};
     bool has_room = memory_.has_room_for_degree(held(), splats_.sh_degree() + 1);
     if (ranks_.several()) has_room = least(*ranks_.all, has_room ? 1 : 0) == 1;
@@ -407,7 +407,7 @@ std::map<std::string, ColourMap> Trainer::exposures() {
 ImageF Trainer::render(const Camera& camera) {
     drain();
     const ShownMean mean(average_, splats_);
-    return step_.render(camera, sh_degree(), background_);
+    return step_.render(camera, sh_degree(), background());
 }
 
 Trainer::State Trainer::state() {
@@ -452,7 +452,7 @@ void Trainer::restore(const State& s) {
     step_.restore_gradient_sum(s.gradient_sum);
     average_.restore(s.mean, s.averaged, splats_);
     iteration_ = s.iteration;
-    opened_ = controlled_ = s.iteration > 0 ? -1 : 0;
+    turns_.opened = turns_.controlled = s.iteration > 0 ? -1 : 0;
     totals_.counters = s.counters;
     set_resolution(std::max(iteration_, 1));
 }

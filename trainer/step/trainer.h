@@ -125,7 +125,9 @@ class Trainer {
     int sh_degree() const { return degree_at(iteration_); }  // in use at the current iteration
     double extent() const { return extent_; }
     /// Behind the splats where pictures are compared: black or white.
-    glm::vec3 background() const { return background_; }
+    glm::vec3 background() const {
+        return glm::vec3(schedule_.options.white_background ? 1.0f : 0.0f);
+    }
     /// What the sides of the photos are divided by now: 1 without a resolution ramp.
     int resolution_divisor() const { return photos_.divisor(); }
     /// Whether the device had no room for the mean that the run was to end with.
@@ -186,7 +188,6 @@ class Trainer {
     OneRank alone_;
     RankGroup ranks_;
     Schedule schedule_;
-    glm::vec3 background_;
     double extent_;  // of the scene
     MemoryBudget memory_;
     GpuSplats splats_;
@@ -202,9 +203,11 @@ class Trainer {
     DegreeProbe probe_;
     RunTotals totals_;
     int iteration_ = 0;
-    int opened_ = 0;      // the iteration after which density control and probes had their turn
-    int controlled_ = 0;  // and that after which density control had
-    std::optional<DensityResult> round_;       // of it, to be told
+    struct Turns {                           // the iterations after which these had theirs
+        int opened = 0;                      // density control and probes
+        int controlled = 0;                  // density control
+        std::optional<DensityResult> round;  // its result, still to be told
+    } turns_;
     std::optional<GradientTree> tree_;         // steps_by_views()
     std::optional<CameraRefinement> cameras_;  // options.refine_cameras
     TrainingStep step_;  // last: it waits for the device before anything that it uses goes

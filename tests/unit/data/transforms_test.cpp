@@ -283,7 +283,7 @@ TEST(Transforms, bad_files_are_errors_that_name_the_frame) {
         EXPECT_NE(error_of([&] { lens_of(head); }).find("focal"), std::string::npos) << head;
     EXPECT_NE(error_of([&] { lens_of(""); }).find("fl_x"), std::string::npos);
     EXPECT_NE(error_of([&] {
-                  lens_of(R"("fl_x": 5, "camera_model": "EQUIRECTANGULAR", )");
+                  lens_of(R"("fl_x": 5, "camera_model": "ORTHOPHOTO", )");
               }).find("EQUIRECTANGULAR"),
               std::string::npos);
     EXPECT_NE(error_of([&] { lens_of(R"("fl_x": 5, "w": 1e300, )"); }).find("size"),
