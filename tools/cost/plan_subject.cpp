@@ -20,7 +20,7 @@ bool distorted(const Dataset& dataset) {
     return std::ranges::any_of(dataset.views, [](const View& v) { return v.lens.distorted(); });
 }
 
-// As loaded, photos may have been straightened.
+// A data set as loaded may have straightened photos.
 Dataset through_the_lens(const PlanRequest& request) {
     DatasetOptions original = request.data;
     original.original_lens = true;
