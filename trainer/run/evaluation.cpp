@@ -11,7 +11,7 @@ namespace darb {
 
 namespace {
 
-// Of the views in the arc, or of the others.
+// The means over the views in the arc, or over the others.
 ArcMeans means_of(const std::vector<ViewMetrics>& views, bool in_arc) {
     ArcMeans means;
     double count = 0;

@@ -20,7 +20,7 @@ struct ArcMeans {  // over the views of an arc that was held out
 
 struct Evaluation {
     int iteration = 0;
-    double seconds = 0;  // of training, evaluation left out
+    double seconds = 0;  // training time, without evaluations
     std::uint32_t splats = 0;
     std::vector<ViewMetrics> views;
     double psnr_db = 0, ssim = 0;  // means over the views; but for an arc, where others are there

@@ -38,7 +38,7 @@ class Progress {
     int first_, last_;
     bool quiet_, terminal_;
     Clock::time_point start_, last_print_;
-    Clock::time_point begin_;  // of the whole run, which restart_rate() leaves
+    Clock::time_point begin_;  // the whole run's begin, which restart_rate() keeps
     std::optional<TimeLeft> left_;
     double loss_ = 0, psnr_db_ = 0;  // smoothed
     bool any_ = false;

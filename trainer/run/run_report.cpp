@@ -15,7 +15,7 @@ namespace darb {
 
 namespace {
 
-constexpr int kJpegQuality = 92;  // of the pictures: a tenth of their PNGs' size
+constexpr int kJpegQuality = 92;  // the pictures take a tenth of the size of PNGs
 
 struct TimeUnit {
     const char* label;

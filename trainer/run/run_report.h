@@ -14,9 +14,9 @@ namespace darb {
 
 struct ReportSample {  // a point of the training curves, averaged or not
     int iteration = 0;
-    double seconds = 0;  // of training
+    double seconds = 0;  // training time
     double loss = 0;
-    double psnr_db = 0;  // of the training batch
+    double psnr_db = 0;  // mean over the training batch
     std::uint32_t splats = 0;
     std::vector<double> pass_ms = {};  // per iteration, by ReportData::passes; may be empty
 };
@@ -42,7 +42,7 @@ struct ReportPass {
 };
 
 struct ReportPicture {
-    std::string name;            // of the view
+    std::string name;            // the view's name
     std::filesystem::path file;  // PNG: photo, render and error side by side, equal widths
     double psnr_db = 0, ssim = 0;
 };
@@ -56,7 +56,7 @@ struct ReportData {
     std::vector<ReportPass> passes;             // in the order they run
     std::vector<std::pair<std::string, std::string>> settings;
     std::vector<ReportPicture> pictures;
-    std::string error_caption = "error x 4";  // of the third part of the pictures
+    std::string error_caption = "error x 4";  // caption of the third part
     std::vector<std::string> notes;           // a sentence each
 };
 

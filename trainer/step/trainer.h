@@ -67,10 +67,10 @@ class ViewOrder {
 struct IterationResult {
     int iteration = 0;  // from 1
     double loss = 0;
-    double psnr_db = 0;  // of the training view
+    double psnr_db = 0;  // for the training view
     std::uint32_t splats = 0, visible = 0, intersections = 0;
-    std::uint32_t pixels = 0;  // of the photo, at the size of now
-    int rest_floats = 0;       // of a splat's harmonics, as buffers hold them
+    std::uint32_t pixels = 0;  // the photo's, at its current size
+    int rest_floats = 0;       // a splat's harmonics, as buffers hold them
     bool ends_step = true;     // false: other views of its batch follow
 };
 
@@ -78,7 +78,7 @@ struct IterationResult {
 struct TrainingPicture {
     const ImageF& image;      // [H][W][3] as it is compared with the photo, not clamped
     const ImageU8& photo;     // [H][W][4], at the size that photos have now
-    const std::string& name;  // of the view
+    const std::string& name;  // the view's name
     int iteration = 0;        // that this is a step of, from 1
     glm::vec3 background{0.0f};
 };
@@ -189,7 +189,7 @@ class Trainer {
     TrainOptions options_;
     Schedule schedule_;
     glm::vec3 background_;
-    double extent_;  // of the scene
+    double extent_;  // the scene's extent
     MemoryBudget memory_;
     GpuSplats splats_;
     TrainingPhotos photos_;
@@ -206,7 +206,7 @@ class Trainer {
     int iteration_ = 0;
     int opened_ = 0;      // the iteration after which density control and probes had their turn
     int controlled_ = 0;  // and that after which density control had
-    std::optional<DensityResult> round_;       // of it, to be told
+    std::optional<DensityResult> round_;       // its result, still to be reported
     std::optional<GradientTree> tree_;         // steps_by_views()
     std::optional<CameraRefinement> cameras_;  // options.refine_cameras
     TrainingStep step_;  // last: it waits for the device before anything that it uses goes
