@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Writes OUT, a C++ file with the commit of SOURCE; only where it changed, so that nothing is
-# compiled again in vain. Run at every build: cmake -DSOURCE=... -DOUT=... -P commit.cmake
+# Writes OUT, a C++ file with the commit of SOURCE, but only where it changed, so that nothing is recompiled in vain.
+# Run at every build: cmake -DSOURCE=... -DOUT=... -P commit.cmake
 execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --exclude=*
   OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE failed)
 if(failed)

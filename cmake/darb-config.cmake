@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# find_package(darb): the target darb::darb, and what it needs.
+# find_package(darb) gives the target darb::darb and finds what it needs.
 include(CMakeFindDependencyMacro)
 find_dependency(Vulkan)
 find_dependency(Threads)

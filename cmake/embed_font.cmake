@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Run at build time: cmake -DOUT=FILE.cpp -DFONT=FILE.ttf -P embed_font.cmake writes FILE.cpp, which holds the font;
-# none where the file is not there. viewer/gui_font.h reads it.
+# Run at build time: cmake -DOUT=FILE.cpp -DFONT=FILE.ttf -P embed_font.cmake writes FILE.cpp, which holds the font, or
+# no font where the file does not exist. viewer/gui_font.h reads it.
 set(bytes "")
 if(EXISTS "${FONT}")
   file(READ "${FONT}" hex HEX)

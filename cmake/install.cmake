@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# cmake --install: the command, and the library as the CMake package darb. find_package(darb) gives darb::darb, all of
-# engine/ and trainer/; add_subdirectory gives the same. docs/library.md shows how it is used.
+# cmake --install: installs the command, and the library as the CMake package darb. find_package(darb) gives darb::darb,
+# which is all of engine/ and trainer/; so does add_subdirectory. docs/library.md shows how to use it.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -10,7 +10,8 @@ set_target_properties(darb_library PROPERTIES EXPORT_NAME darb)
 add_library(darb::darb ALIAS darb_library)
 
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/darb)
-set(headers ${CMAKE_INSTALL_INCLUDEDIR}/darb)  # of its own: the includes begin with engine/, trainer/ and shaders/
+# a folder of its own, because the includes begin with engine/, trainer/ and shaders/
+set(headers ${CMAKE_INSTALL_INCLUDEDIR}/darb)
 target_include_directories(darb_options INTERFACE $<INSTALL_INTERFACE:${headers}>)
 install(TARGETS darb RUNTIME COMPONENT darb)
 install(TARGETS darb_library darb_options darb_shaders darb_core darb_ranks darb_kernels darb_scene darb_reference darb_data darb_stereo
@@ -24,7 +25,7 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/generated/darb-config-ver
 install(FILES cmake/darb-config.cmake ${PROJECT_BINARY_DIR}/generated/darb-config-version.cmake
   DESTINATION ${package} COMPONENT dev)
 
-# What the desktop and the shells know of the command. The pages are made by the command that was built.
+# What desktops and shells need to know about the command. The command that was built makes the pages.
 find_program(PYTHON3_PROGRAM python3)
 if(PYTHON3_PROGRAM AND NOT DARB_SANITIZE)
   set(pages ${PROJECT_BINARY_DIR}/pages)
@@ -42,7 +43,7 @@ install(FILES assets/desktop/darb.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/a
 install(FILES assets/desktop/darb.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/mime/packages COMPONENT darb)
 install(FILES assets/desktop/darb.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps COMPONENT darb)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/darb RENAME copyright COMPONENT darb)
-if(GUI_FONT)  # the command holds it
+if(GUI_FONT)  # the command contains it
   install(FILES /usr/share/doc/fonts-roboto-unhinted/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/darb
     RENAME copyright.fonts-roboto-unhinted COMPONENT darb)
 endif()

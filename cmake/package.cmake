@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # cpack: the Debian packages darb (the command) and libdarb-dev (the library); tools/package.sh runs it.
-# python3-darb is made by tools/package_python.sh.
+# tools/package_python.sh makes python3-darb.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME darb)
 set(CPACK_PACKAGE_CONTACT "The darb authors <darb@localhost>")

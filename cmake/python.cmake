@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-# Whether the Python module is built: DARB_PYTHON is OFF, ON, or AUTO, which builds it where what it takes is found.
-# DARB_WITH_PYTHON is the answer. Libraries are compiled for it, so that it is found out before them.
+# Whether the Python module is built. DARB_PYTHON is OFF, ON, or AUTO, which builds it where everything it needs is
+# found; DARB_WITH_PYTHON is the answer. It is found out before the libraries, because they are compiled differently for
+# the module.
 set(DARB_WITH_PYTHON OFF)
 if(DARB_PYTHON)
-  # That of the distribution, as its numpy is.
+  # Python must be that of the distribution, as its numpy is.
   if(NOT Python3_EXECUTABLE AND EXISTS /usr/bin/python3)
     set(Python3_EXECUTABLE /usr/bin/python3 CACHE FILEPATH "The Python that the module is for")
   endif()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-# darb_compile_shaders(TARGET FOLDER): compiles every FOLDER/*/*.comp to SPIR-V and embeds it.
-# The result is a static library with one table, darb::shader_table(), name -> SPIR-V words; the
-# name is the file's stem. Specialization constants stay open until pipeline creation.
+# darb_compile_shaders(TARGET FOLDER): compiles every FOLDER/*/*.comp to SPIR-V and embeds it. The result is a static
+# library with one table, darb::shader_table(), from names to SPIR-V words; a name is the stem of its file.
+# Specialization constants stay open until pipelines are created.
 function(darb_compile_shaders target folder)
   file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*/*.comp)
   set(out ${PROJECT_BINARY_DIR}/generated/shaders)
@@ -40,8 +40,8 @@ std::span<const ShaderBinary> shader_table() {
   target_link_libraries(${target} PUBLIC darb_options)
 endfunction()
 
-# darb_constant_names(TARGET): the names of all specialization constants, generated for engine/gpu/pipeline.h, which
-# TARGET has. What links it is compiled after them.
+# darb_constant_names(TARGET): generates the names of all specialization constants for engine/gpu/pipeline.h, which
+# belongs to TARGET. Whatever links TARGET is compiled afterwards.
 function(darb_constant_names target)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/shaders/*.comp ${PROJECT_SOURCE_DIR}/shaders/*.glsl)
   set(script ${PROJECT_SOURCE_DIR}/cmake/constant_names.cmake)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-# darb_linked_anywhere(TARGETS...): static libraries that a shared one may take in, as the Python module does.
-# Nothing of them can be put in the place of, so that functions are called as in a program. Without the
-# module they are compiled as for programs.
+# darb_linked_anywhere(TARGETS...): marks static libraries that a shared library, such as the Python module, may
+# contain. Their functions cannot be replaced from outside, so they are called as in a program. Without the module they
+# are compiled as for programs.
 function(darb_linked_anywhere)
   if(DARB_WITH_PYTHON)
     set_target_properties(${ARGN} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
@@ -9,8 +9,8 @@ function(darb_linked_anywhere)
   endif()
 endfunction()
 
-# darb_library(NAME DEPENDS...): static library darb_NAME from engine/NAME/*.cpp. A folder that has
-# only headers so far still becomes a library, so that the arrows in CMakeLists.txt hold.
+# darb_library(NAME DEPENDS...): the static library darb_NAME from engine/NAME/*.cpp. A folder with headers alone
+# becomes a library, too, so that the arrows in CMakeLists.txt hold.
 function(darb_library name)
   file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/engine/${name}/*.cpp)
   if(NOT sources)
@@ -24,8 +24,8 @@ function(darb_library name)
   darb_linked_anywhere(darb_${name})
 endfunction()
 
-# What most files parse and is slow to parse, parsed once. The clang preset does without, so that a
-# forgotten include is an error there (CMAKE_DISABLE_PRECOMPILE_HEADERS in CMakePresets.json).
+# Headers that most files parse and that are slow to parse, which are parsed once. The clang preset does without them,
+# so that a forgotten include is an error there (CMAKE_DISABLE_PRECOMPILE_HEADERS in CMakePresets.json).
 set(darb_slow_headers <algorithm> <cmath> <filesystem> <functional> <optional> <string> <vector>
   <fmt/format.h> <glm/glm.hpp> <nlohmann/json.hpp>)
 file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/generated/precompiled.cpp CONTENT "")

@@ -6,14 +6,14 @@
 cmake_policy(PUSH)
 cmake_policy(VERSION 3.22)  # ctest, which includes this, sets none
 
-# Without validation: tests of processes and scripts, those that look at SPIR-V or at other vector widths, and tests of
-# passes that other tests record with other numbers.
+# Without validation run tests of processes and scripts, tests that look at SPIR-V or at other vector widths, and tests
+# of passes that other tests record with other numbers.
 set(darb_without_validation "_slow$|PassSpirv|^scripts\\.|^pages\\.|\\.Outputs$")
 set(darb_same_passes kernel_gradient_test walk_test accuracy_walk_test hard_case_test blend_test blend_backward_test
   project_test effect_picture_test viewer_picture_test)
-# Not under sanitizers: numerics of the device, which have no more host code than others, and what reads no files.
+# Not under sanitizers run numerical tests of the device, which use no other host code, and tests that read no files.
 set(darb_not_sanitized "_slow$|PassSpirv|\\.Reference/|^scripts\\.|^pages\\.|\\.(Outputs|StrategyTable|ClusterRows|Undistort|Psi)$")
-# The same as cases of GoogleTest, where each is a process.
+# The same tests as cases of GoogleTest, where each case is a process.
 set(darb_not_sanitized_cases *_slow *_slow/* *_long *_long/* *PassSpirv* Outputs.* every*/* settings/* Reference/*
   *WalkCases* *TuningWalk* Psi.* *HardCases* *EffectPicture* *EffectTraining* *for_every_kernel *Accuracy_switch_changes*)
 

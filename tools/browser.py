@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Headless Chromium over its debugging pipe, with what a page says and asks for. Standard library only.
+"""Headless Chromium over its debugging pipe, and what a page reports and requests. Needs only the standard library.
 
 Used by tools/page_check.py; it does nothing by itself.
 """
@@ -24,10 +24,10 @@ def find():
 
 
 class Browser:
-    """One page. said: console messages and exceptions; requests: addresses asked for, data: and blob: left out."""
+    """One page. said: console messages and exceptions; requests: addresses that it asked for, without data: and blob:."""
 
     def __init__(self, width=1280, height=720):
-        # Its helpers may still write there when it has ended.
+        # The browser's helpers may still write there after it has ended.
         self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         read_end, self.write_to = os.pipe()
         self.read_from, write_end = os.pipe()
@@ -123,7 +123,7 @@ class Browser:
             file.write(base64.b64decode(data))
 
     def touch(self, steps):
-        """steps: lists of (x, y) of the fingers; the first puts them down, and they are lifted at the end."""
+        """steps: lists of (x, y) of the fingers. The first list puts them down, and they are lifted at the end."""
         for i, points in enumerate(steps):
             self.call("Input.dispatchTouchEvent", type="touchMove" if i else "touchStart",
                       touchPoints=[{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)])

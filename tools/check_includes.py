@@ -39,13 +39,13 @@ def read_arrows(path):
 
 
 def part_of(path, arrows):
-    """The longest part whose folder holds path, or None."""
+    """The longest part whose folder holds the path, or None."""
     fitting = [part for part in arrows if path.startswith(part + "/")]
     return max(fitting, key=len, default=None)
 
 
 def named(part, targets):
-    """Those of the targets that name the part, itself or as one of a folder."""
+    """The targets that name the part, either itself or as one part of a folder."""
     return {target for target in targets if part == target or (part or "").startswith(target + "/")}
 
 
@@ -58,7 +58,7 @@ def source_files(root, arrows):
 
 
 def resolve(root, file, included):
-    """The included file relative to root: beside the includer, else from an include folder."""
+    """The included file relative to root, looked up beside the includer and then in an include folder."""
     beside = os.path.normpath(os.path.join(os.path.dirname(file), included))
     for candidate in (beside, included, "shaders/" + included):
         if os.path.isfile(os.path.join(root, candidate)):
@@ -67,7 +67,7 @@ def resolve(root, file, included):
 
 
 def violations(root, file, arrows, libraries, used):
-    """Yields (line, message); adds to used the arrows (part, target) that the file takes."""
+    """Yields (line, message), and adds the arrows (part, target) that the file needs to `used`."""
     part = part_of(file, arrows)
     if part is None:
         yield 1, "in no part that ARCHITECTURE.md names"

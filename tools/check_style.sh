@@ -3,7 +3,7 @@
 # Include arrows and layout of every source file, and the links of every page; prints each violation.
 #   tools/check_style.sh [--fix | --tidy] [ROOT]
 #     --fix    let clang-format rewrite the files
-#     --tidy   clang-tidy instead, on every source file (it takes minutes); .clang-tidy has its checks
+#     --tidy   run clang-tidy instead, on every source file (it takes minutes); .clang-tidy lists its checks
 set -uo pipefail
 case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
@@ -19,7 +19,7 @@ if [[ $tidy == 1 ]]; then
     command -v clang-tidy-14 >/dev/null || { echo "check_style.sh: --tidy runs clang-tidy-14; install that package" >&2; exit 2; }
     cmake -S . -B build-tidy -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
         -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DDARB_TESTS=OFF >/dev/null || exit 1
-    ninja -C build-tidy generated/constants/darb_constant_names.h >/dev/null || exit 1 # a header that is made
+    ninja -C build-tidy generated/constants/darb_constant_names.h >/dev/null || exit 1 # a generated header
     git ls-files 'engine/*.cpp' 'trainer/*.cpp' 'viewer/*.cpp' 'tools/*.cpp' |
         xargs -P "$(nproc)" -n 8 clang-tidy-14 -p build-tidy --quiet --warnings-as-errors='*' 2>/dev/null || exit 1
     echo "tidy: clean"

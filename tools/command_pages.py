@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Man pages, and completion for bash, zsh and fish, from the option tables of a built darb.
+"""Makes man pages, and completion for bash, zsh and fish, from the option tables of a built darb.
 
   tools/command_pages.py DARB OUT    writes OUT/man1/darb*.1.gz, OUT/bash/darb, OUT/zsh/_darb, OUT/fish/darb.fish
 
-Each command has a page. What stands in them is what `darb COMMAND --help-all` shows.
+Each command has a page, with the options that `darb COMMAND --help-all` shows.
 """
 import gzip
 import json
@@ -18,7 +18,7 @@ EXITS = [("0", "Done."), ("1", "An internal error, or a check that failed."),
 
 
 def roff(text):
-    """Text as troff shows it as it is."""
+    """Escapes text so that troff shows it as it is."""
     text = text.replace("\\", "\\e").replace("-", "\\-").replace("`", "\\(ga").replace("'", "\\(aq")
     return "\\&" + text if text[:1] in ".'" else text
 

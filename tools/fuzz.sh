@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: MIT
 # Fuzzes every reader of files with libFuzzer (clang): splat scenes, photos, COLMAP, transforms.json, checkpoints; and, where
 # the tests are built, the pipeline with random scenes that hold poison (tests/pipeline/scene_fuzz_test.cpp).
-#   tools/fuzz.sh [MINUTES]      of each (default 10; fractions are legal); 0.02 is what the test gate does
-# Seeds: small whole files of every format and version (tests/fuzz/make_seeds.cpp). What is learned stays in
-# build-asan/corpus, findings in build-asan/crashes.
+#   tools/fuzz.sh [MINUTES]      for each reader (default 10; fractions work); the test gate runs 0.02
+# Seeds are small whole files of every format and version (tests/fuzz/make_seeds.cpp). What was learned stays in
+# build-asan/corpus, and findings in build-asan/crashes.
 set -euo pipefail
 case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."

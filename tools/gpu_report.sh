@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Measures darb on this machine's GPU and leaves one folder with one page that can be attached to a report.
+# Measures darb on this machine's GPU and leaves a folder with a page that you can attach to a report.
 #   tools/gpu_report.sh [-o FOLDER] [--darb PATH] [--device NAME] [--photos DATASET] [--minutes N]
 #
 #   -o FOLDER          where to write; default: gpu_report. Its page is FOLDER/index.html, all of it FOLDER.tar.gz.
@@ -9,8 +9,8 @@
 #   --photos DATASET   also train 500 iterations on photos of your own
 #   --minutes N        time limit of all steps together; default: 10
 #
-# Each step has its own file in FOLDER and a share of the time. A step that fails or takes too long is said on the page,
-# and the others still run. Nothing is sent anywhere. The page names the device, its driver and the processor, and no
+# Each step has its own file in FOLDER and a share of the time. If a step fails or takes too long, the page says so and
+# the other steps still run. Nothing is sent anywhere. The page names the device, its driver and the processor, but no
 # path, name or address of this machine.
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
@@ -29,13 +29,13 @@ while (($#)); do
                 --minutes) minutes=$2 ;;
             esac
             shift 2 ;;
-        *) echo "gpu_report.sh: no option '$1'; --help lists them" >&2; exit 2 ;;
+        *) echo "gpu_report.sh: no such option: '$1'; --help lists them" >&2; exit 2 ;;
     esac
 done
 [[ $minutes =~ ^[1-9][0-9]*$ ]] || { echo "gpu_report.sh: --minutes takes a whole number from 1, not '$minutes'" >&2; exit 2; }
 [[ -z $photos || -e $photos ]] || { echo "gpu_report.sh: no folder '$photos' (--photos)" >&2; exit 2; }
-[[ -z $photos ]] || photos=$(realpath "$photos") # so that the page can take it out
-[[ ! -e $out || -e $out/steps.txt ]] || { echo "gpu_report.sh: '$out' is there and no report of before; name another with -o" >&2; exit 2; }
+[[ -z $photos ]] || photos=$(realpath "$photos") # so that the page can remove it
+[[ ! -e $out || -e $out/steps.txt ]] || { echo "gpu_report.sh: '$out' exists and is not an earlier report; name another folder with -o" >&2; exit 2; }
 if [[ -z $darb ]]; then
     if [[ -x $here/build/darb ]]; then darb=$here/build/darb
     elif command -v darb >/dev/null; then darb=$(command -v darb)
@@ -47,13 +47,13 @@ fi
 "$darb" --version >/dev/null || { echo "gpu_report.sh: '$darb' does not run" >&2; exit 2; }
 mkdir -p "$out" || exit 2
 out=$(cd "$out" && pwd)
-# Of a report before this one.
+# Removes the files of an earlier report.
 for name in devices passes check bench filled growth train photos validation model; do
     rm -f "$out/$name.txt" "$out/$name.json"
 done
 
-# step NAME PERCENT COMMAND...: its output goes to NAME.txt, a row NAME, state, seconds to steps.txt. What a step leaves
-# of its time is the next one's.
+# step NAME PERCENT COMMAND...: the output goes to NAME.txt, and a row NAME, state, seconds to steps.txt. Time that a
+# step does not use goes to the next one.
 spare=0
 step() {
     local name=$1 limit=$((minutes * 60 * $2 / 100 + spare)) begun=$SECONDS state
@@ -82,7 +82,7 @@ fi
 [[ -z $photos ]] || step photos 15 "$darb" train "$photos" -o "$out/photos" "${device[@]}" --iterations 500 -r 400 --eval
 if compgen -G '/usr/share/vulkan/explicit_layer.d/*validation*' >/dev/null && [[ -d $here/assets/scene ]]; then
     step validation 10 env DARB_VALIDATION=1 "$darb" train "$here/assets/scene" -o "$out/validation" "${device[@]}" --iterations 20
-    # The layer's messages end no run.
+    # Messages of the layer do not end a run.
     grep -q 'vulkan.validation:' "$out/validation.txt" && sed -i 's/^validation\tok/validation\tFAILED/' "$out/steps.txt"
 fi
 if [[ -s $out/passes.json ]]; then step model 2 python3 -B "$here/tools/lab/gpu_model.py" "$out/passes.json"; fi

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Finds links in the Markdown pages that lead nowhere: to a file that is not there, or to a heading that is not there.
+"""Finds links in the Markdown pages that lead nowhere: to a file or a heading that does not exist.
 
     tools/links.py [--root DIR]      prints each dead link with its page and line; exit code 1 if there is one
 
@@ -14,21 +14,21 @@ import sys
 
 
 def plain(text):
-    """The text of a heading as it is read: links by their words, no emphasis."""
+    """The text of a heading as it is read: links by their words, without emphasis."""
     text = re.sub(r"!\[[^\]]*\]\([^)]*\)", "", text)
     text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
     return re.sub(r"\*\*|__|(?<!\w)[*_](?=\w)|(?<=\S)[*_](?!\w)", "", text)
 
 
 def anchors(path):
-    """Names under which a page's headings are reached, as GitHub makes them."""
+    """The names under which a page's headings can be linked, as GitHub makes them."""
     with open(path, encoding="utf-8") as file:
         headings = re.findall(r"^#{1,6} +(.*?)\s*$", file.read(), re.M)
     return {re.sub(r"[^\w\- ]", "", plain(h.replace("`", "")).lower()).replace(" ", "-") for h in headings}
 
 
 def dead_links(path):
-    """-> [(line number, target)] of links to a file or heading that is not there; addresses of the web are not tried"""
+    """-> [(line number, target)] for links to a file or heading that does not exist; web addresses are not tried."""
     with open(path, encoding="utf-8") as file:
         text = re.sub(r"^(```.*?^```|    .*?)$", lambda m: "\n" * m[0].count("\n"), file.read(), flags=re.M | re.S)
     found = []
@@ -37,7 +37,7 @@ def dead_links(path):
             continue
         name, _, anchor = link[1].partition("#")
         if re.match(r"\.\./\.\./(releases|issues|deployments)\b", name):
-            continue  # of the repository on GitHub, beside its files
+            continue  # part of the repository on GitHub, not a file
         target = os.path.join(os.path.dirname(path), name) if name else path
         if not os.path.exists(target) or (anchor and target.endswith(".md") and anchor not in anchors(target)):
             found.append((text.count("\n", 0, link.start()) + 1, link[1]))
@@ -61,7 +61,7 @@ def main():
     dead = 0
     for name in names:
         for line, target in dead_links(os.path.join(root, name)):
-            print(f"{name}:{line}: a link to {target}, which is not there")
+            print(f"{name}:{line}: a link to {target}, which does not exist")
             dead += 1
     print(f"links: {len(names)} pages, {dead} dead links")
     return 1 if dead else 0

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# The packages of darb, for amd64. Run it on Debian 12, as the portable archive takes its libraries from there.
+# Makes the packages of darb for amd64. Run it on Debian 12, because the portable archive takes its libraries from
+# there.
 #   tools/package.sh [OUT] [deb | portable]...      default: OUT is build-portable/out; both
 #     deb        OUT/darb_VERSION_amd64.deb and OUT/libdarb-dev_VERSION_amd64.deb
 #     portable   OUT/darb-VERSION-linux-amd64.tar.xz: any Linux with glibc 2.31 or later and a Vulkan 1.3 driver
-# The archive's libraries are linked statically. Debian has some as shared ones alone: these are built from its source
-# packages, and the Vulkan loader lies beside the command. tools/package_test.sh installs both in bare systems.
+# The archive's libraries are linked statically. Where Debian has only shared ones, they are built from its source
+# packages; the Vulkan loader lies beside the command. tools/package_test.sh installs both in bare systems.
 set -euo pipefail
 case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
@@ -24,8 +25,8 @@ done
 jobs=${JOBS:-$(nproc)}
 common=(-G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=g++ -DCMAKE_UNITY_BUILD=ON -DDARB_TESTS=OFF -DCMAKE_INSTALL_PREFIX=/usr)
 
-# One build folder, so that both are linked from the same objects; what either found of the libraries that differ is
-# forgotten before the other.
+# Both share a build folder, so that they are linked from the same objects. What one found of the libraries that differ
+# is forgotten before the other.
 build=build-portable
 configure() {
     local forgotten=(-U'*_LIBRARY' -U'*_LIBRARY_RELEASE' -U'*_LIBRARY_DEBUG')
@@ -43,7 +44,7 @@ make_deb() {
 libraries=$PWD/$build/libraries # the prefix of what is built here
 system=/usr/lib/x86_64-linux-gnu
 
-# fetch PACKAGE/SUITE...: Debian's source packages, whatever sources this machine's own apt knows.
+# fetch PACKAGE/SUITE...: fetches Debian's source packages, whatever sources this machine's own apt knows.
 fetch() {
     local apt=$libraries/apt mirror
     mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2>/dev/null | grep -m 1 '/debian/*$' || true)
@@ -80,7 +81,7 @@ make_libraries() {
     touch "$libraries/done"
 }
 
-# newest_glibc FILE: the newest version of glibc that it asks for.
+# newest_glibc FILE: prints the newest version of glibc that the file needs.
 newest_glibc() { objdump -T "$1" | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -1; }
 
 make_portable() {

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# The Debian package python3-darb of a build with the Python module.
+# Makes the Debian package python3-darb from a build with the Python module.
 #   tools/package_python.sh BUILD OUT      writes OUT/python3-darb_VERSION_ARCH.deb
-# Holds what `cmake --install BUILD --component python` installs below /usr, compiled when it is installed.
+# It holds what `cmake --install BUILD --component python` installs below /usr; it is compiled when it is installed.
 set -euo pipefail
 case ${1:-} in
     -h | --help | "") sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;;

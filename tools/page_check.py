@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Holds web pages in headless Chromium (software GL) against `darb render`.
+"""Compares web pages in headless Chromium (software GL) with `darb render`.
 
     tools/page_check.py SCENE... [options]      a table: bytes, seconds to the first picture, frames a second, dB
 
-For each scene and kernel it writes a page (the scene is relabelled, not trained again), draws cameras around the scene
-in the page and with darb, and compares. It fails where a page is below --least or --least-exact dB at its worst
-camera, writes to the console, or fetches anything; where the first of a scene does not answer mouse, keys and
-touch; and where a damaged page does not say so. Frames a second are those of a turn in a window of 1280x720 px, once
-the page has found its pace; dB of merged splats are of the two levels that slow devices draw in motion.
+For each scene and kernel it writes a page (the scene is relabelled, not trained again), draws cameras around the scene in
+the page and with darb, and compares the pictures. It fails where a page's worst camera is below --least or --least-exact
+dB, or where it writes to the console or fetches anything; where the first page of a scene does not answer mouse, keys and
+touch; and where a damaged page does not say so. Frames a second are those of a turn in a window of 1280x720 px, once the
+page has found its pace; dB of merged splats are those of the two levels that slow devices draw in motion.
 """
 
 import argparse
@@ -27,7 +27,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PAPER = ["gaussian", "raised_cosine", "half_cosine_squared", "sinc", "inverse_quadratic"]
 HOSTILE = "</script><img src=x onerror=hacked=1>\"'&{{scene}}\n\u202eab\u2028<!--"
 
-# dB between two pictures as data URLs, drawn by the browser's own decoder.
+# PSNR in dB between two pictures as data URLs, decoded by the browser itself.
 COMPARE = """(async (one, other) => {
   const pixels = async url => {
     const image = new Image();
@@ -88,7 +88,7 @@ def relabelled(path, kernel, arguments, folder):
 
 
 def camera_list(scene, views, width, height):
-    """Around the focus: far and near, high and low, some off the centre; as cameras.json has it."""
+    """Cameras around the focus, far and near, high and low, some off the centre, in the form of cameras.json."""
     cameras, focus, radius = [], scene["focus"], scene["radius"]
     for i in range(views):
         turn, rise = 2 * math.pi * i / views, math.radians([20, -5, 45][i % 3])
@@ -130,7 +130,7 @@ def check(failures, fine, text):
 def worst_of_page(page, truths, keep):
     """-> dB of each camera."""
     found = []
-    page.resize(160, 120)  # what it draws for itself between them takes time
+    page.resize(160, 120)  # what the page draws for itself between them takes time
     for i, truth in enumerate(truths):
         picture = page.run(f"darb.picture({i})")
         if keep:
@@ -142,7 +142,7 @@ def worst_of_page(page, truths, keep):
 
 
 def merged_splats(page, truths):
-    """-> dB of the levels that are drawn in motion, at the first camera; none of a scene of few splats."""
+    """-> dB of the levels that are drawn in motion, at the first camera; empty for a scene of few splats."""
     for _ in range(400):
         levels = page.run("darb.state.levels")
         if levels > 2 or page.run("darb.scene.count") < page.run("darb.fewSplats"):
@@ -239,7 +239,7 @@ def check_hostile(page, scene, arguments, failures, folder):
 
 
 def check_damaged(page, path, arguments, failures, folder):
-    """Cut off anywhere, or with a letter of its splats changed, a page says so."""
+    """A page that is cut off anywhere, or has a changed letter in its splats, must say so."""
     with open(path, "rb") as file:
         whole = file.read()
     head, payload = whole.index(b"</script>"), whole.index(b'id="part0">') + 11

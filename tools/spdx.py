@@ -23,7 +23,7 @@ FOLDERS = ("cmake", "engine", "examples", "shaders", "tests", "tools", "trainer"
 
 
 def comment_of(path):
-    """The comment mark of a file's language; None for what is no source."""
+    """The comment mark of a file's language; None for files that are not sources."""
     if os.path.basename(path) == "CMakeLists.txt":
         return "#"
     return COMMENTS.get(os.path.splitext(path)[1])
@@ -38,13 +38,13 @@ def sources(root):
 
 
 def with_line(text, comment):
-    """The text with the line; the same text where it has one within its first five lines."""
+    """The text with the line; unchanged where one of its first five lines is that line."""
     if any(IDENTIFIER in line for line in text.split("\n", 5)[:5]):
         return text
     line = f"{comment} {IDENTIFIER}\n"
     if text.startswith("#!"):
         first, _, rest = text.partition("\n")
-        # Scripts print their head as their help, from its second line on: now from the third.
+        # Scripts print their head as help, from the second line on; with this line, from the third.
         rest = re.sub(r"(?<=sed -n ')2,(\d+|/)", lambda m: "3," + ("/" if m[1] == "/" else str(int(m[1]) + 1)), rest)
         return f"{first}\n{line}{rest}"
     return line + text

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Sets up, builds and runs the checks of the project. tests/labels.cmake says which tests a step has. Ends with what
-# failed, then "N passed, N failed": cases of tests, and one for each other step.
+# Sets up, builds and runs the checks of the project. tests/labels.cmake says which tests belong to a step. It ends with
+# what failed and then "N passed, N failed", which counts cases of tests, and one for each other step.
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
@@ -28,11 +28,11 @@ logs=$(mktemp -d)
 trap 'rm -rf "$logs"' EXIT
 passed=0 failed=0 skipped=0 failures=()
 
-build() { # PRESET [TARGET...]: goes on after an error, so that all are seen
+build() { # PRESET [TARGET...]: goes on after an error, so that all errors are shown
     cmake --preset "$1" >"$logs/configure" 2>&1 || { cat "$logs/configure"; return 1; }
     cmake --build --preset "$1" -j "$(nproc)" ${2:+--target "${@:2}"} -- -k 0
 }
-run_tests() { # BUILD LABEL [OPTION...]: tests start a thread a core themselves, so two at a time are plenty
+run_tests() { # BUILD LABEL [OPTION...]: tests start one thread per core themselves, so two at a time are enough
     local good bad out status
     rm -f "$1/Testing/Temporary/LastTest.log"
     ctest --test-dir "$1" --output-on-failure --no-tests=error -j2 -L "^$2\$" "${@:3}" 2>&1 | tee "$logs/ctest"
@@ -44,11 +44,11 @@ run_tests() { # BUILD LABEL [OPTION...]: tests start a thread a core themselves,
 }
 logged() { "$@" 2>&1 | tee "$logs/$step"; }
 sanitized() { ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 run_tests build-asan sanitized --timeout 300 "$@"; }
-fetch_drivers() { # what drivers.gpu_compilers_slow compiles with; it skips where they cannot be had
+fetch_drivers() { # what drivers.gpu_compilers_slow compiles with; that test skips where they cannot be fetched
     [[ -e build/gpu_compilers/bookworm-backports-radeon.json ]] ||
         timeout 120 tools/lab/gpu_compilers.py fetch build/gpu_compilers || echo "setup: no driver of AMD to compile with"
 }
-readers='core|kernels|scene|data|trainer' # libraries that read files, and what those stand on
+readers='core|kernels|scene|data|trainer' # libraries that read files, and those below them
 run_step() {
     case $1 in
         setup) logged tools/setup.sh && fetch_drivers ;;
@@ -73,7 +73,7 @@ for step in $steps; do
     if run_step "$step"; then word=ok; else word=FAILED failures+=("$step"); fi
     [[ $((passed + failed)) != "$before" ]] || { [[ $word == ok ]] && passed=$((passed + 1)) || failed=$((failed + 1)); }
     echo "=== $step: $word, $((SECONDS - begun)) s"
-    [[ $word == ok || ! " setup release clang " == *" $step "* ]] || break # nothing that follows can run
+    [[ $word == ok || ! " setup release clang " == *" $step "* ]] || break # nothing after this could run
 done
 for step in ${failures[@]+"${failures[@]}"}; do
     echo "=== $step, what failed:"

@@ -17,7 +17,6 @@ namespace darb::check {
 namespace {
 
 using reference::random_scene;
-using reference::SceneOptions;
 using reference::TestScene;
 
 // A camera at the origin that looks along z, and splats at depth 2 unless stated otherwise, so that

@@ -28,9 +28,10 @@ using Window = std::array<float, 2 * kRadius + 1>;
 Window gaussian_window() {
     std::array<double, 2 * kRadius + 1> weights{};
     double sum = 0;
-    for (int i = -kRadius; i <= kRadius; ++i) {
-        weights[static_cast<std::size_t>(i + kRadius)] = std::exp(-i * i / (2 * kSigma * kSigma));
-        sum += weights[static_cast<std::size_t>(i + kRadius)];
+    for (std::size_t k = 0; k < weights.size(); ++k) {
+        const int i = static_cast<int>(k) - kRadius;
+        weights[k] = std::exp(-i * i / (2 * kSigma * kSigma));
+        sum += weights[k];
     }
     Window window{};
     for (std::size_t i = 0; i < window.size(); ++i)
@@ -124,7 +125,8 @@ double psnr(const ImageF& image, const ImageF& truth) {
                 static_cast<double>(std::clamp(truth.data[i + c], 0.0f, 1.0f));
             sum += difference * difference;
         }
-    const double mean = sum / static_cast<double>(image.data.size() / channels * used);
+    const std::size_t compared = image.data.size() / channels * used;
+    const double mean = sum / static_cast<double>(compared);
     return mean == 0 ? std::numeric_limits<double>::infinity() : -10 * std::log10(mean);
 }
 

@@ -77,13 +77,13 @@ printf '# A page: one\n\n[Good](b.md#a-page-one), [good](#a-page-one), `[no](lin
 expect "links that lead somewhere" 0 '^links: 2 pages, 0 dead links'
 
 printf '\n[Bad](../docs/nowhere.md)\n' >>"$root/docs/b.md"
-expect "link to no file" 1 'docs/b.md:7: a link to ../docs/nowhere.md, which is not there'
+expect "link to no file" 1 'docs/b.md:7: a link to ../docs/nowhere.md, which does not exist'
 
 printf '# A\n\n[Bad](#b)\n' >"$root/docs/b.md"
-expect "link to no heading" 1 'docs/b.md:3: a link to #b, which is not there'
+expect "link to no heading" 1 'docs/b.md:3: a link to #b, which does not exist'
 
 printf '# A\n\n[Releases](../../releases/latest), [bad](../../release)\n' >"$root/docs/b.md"
-expect "link to the releases beside the files" 1 '^docs/b.md:3: a link to ../../release, which is not there'
+expect "link to the releases beside the files" 1 '^docs/b.md:3: a link to ../../release, which does not exist'
 expect "no more than that one" 1 '^links: 2 pages, 1 dead links'
 
 fresh_tree

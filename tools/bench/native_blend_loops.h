@@ -5,18 +5,18 @@
 // reference, as by value their calling convention would depend on the set. There is no include
 // guard, for that reason.
 
-constexpr int W = DARB_LANES;
+inline constexpr int W = DARB_LANES;
 typedef float F __attribute__((vector_size(4 * DARB_LANES)));
 typedef std::int32_t I __attribute__((vector_size(4 * DARB_LANES)));
 typedef float F8 __attribute__((vector_size(32)));
 // Column and row of a lane's pixel in rows of 8.
 #if DARB_LANES == 8
-constexpr F kX = {0, 1, 2, 3, 4, 5, 6, 7}, kY = {};
+inline constexpr F kX = {0, 1, 2, 3, 4, 5, 6, 7}, kY = {};
 #else
-constexpr F kX = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
-constexpr F kY = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
+inline constexpr F kX = {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7};
+inline constexpr F kY = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
 #endif
-constexpr int V = kBlockPixels / W;  // vectors per block
+inline constexpr int V = kBlockPixels / W;  // vectors per block
 
 inline std::size_t collect(const BlendFrame& f, std::uint32_t begin, std::uint32_t end,
                            std::uint32_t block, Hits& hits) {
@@ -57,7 +57,8 @@ struct Offset {  // mean - pixel centre, and the whitened offset
 /// dx0, dy0: mean minus the centre of the block's first pixel.
 inline void offset_of(int v, float dx0, float dy0, const glm::vec4& shape, float l22, Offset& o) {
     const F dx = dx0 - kX;
-    o.dy = (dy0 - static_cast<float>(v * W / kBlockSide)) - kY;
+    const int row = v * W / kBlockSide;
+    o.dy = (dy0 - static_cast<float>(row)) - kY;
     o.x = shape.z * dx + shape.w * o.dy;
     o.y = l22 * o.dy;
 }

@@ -21,7 +21,7 @@ bool distorted(const Dataset& dataset) {
         dataset.views, [](const View& v) { return v.lens.distorted() && !v.lens.panorama(); });
 }
 
-// As loaded, photos may have been straightened.
+// A data set as loaded may have straightened photos.
 Dataset through_the_lens(const PlanRequest& request) {
     DatasetOptions original = request.data;
     original.original_lens = true;

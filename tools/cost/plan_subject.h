@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a plan is made for: a data set to train on or a scene to render, with its plan and what
-// frames or iterations of it cost.
+// What a plan is made for, either a data set to train on or a scene to render; with its plan, and
+// with what frames or iterations of it cost.
 #pragma once
 
 #include <filesystem>
@@ -19,33 +19,33 @@ namespace darb {
 
 struct PlanRequest {
     std::filesystem::path what;     // a data set, a scene, or the output folder of a run
-    std::filesystem::path cameras;  // of a scene: those that it will be rendered through
+    std::filesystem::path cameras;  // scenes: the cameras that will look at it
     std::string device, effects = "auto";
-    bool depth = false;            // of a scene: depth images are wanted, too
-    std::optional<int> sh_degree;  // of a data set, as is the kernel
+    bool depth = false;            // scenes: depth images are wanted, too
+    std::optional<int> sh_degree;  // data sets, as is the kernel
     std::optional<int> kernel;
     DatasetOptions data;
-    StoredUnits units;  // of a scene
+    StoredUnits units;  // scenes
 };
 
 struct PlanSubject {
     bool training = false;
-    SplatModel model;  // of a scene, as are the views of its cameras
+    SplatModel model;  // set for scenes, as are the views of its cameras
     std::vector<View> views;
-    Dataset dataset;  // of training
+    Dataset dataset;  // set for training
     std::vector<ImageU8> photos;
 };
 
-/// Throws Error where the path cannot be read or an option is for the other kind; notes of the
-/// readers are said.
+/// Opens what the request names and prints the readers' notes. Throws Error where the path cannot
+/// be read or an option is for the other kind.
 PlanSubject open_subject(const PlanRequest& request);
 int degree_of(const PlanSubject& s, const PlanRequest& request);
 EffectPlan plan_of(const PlanSubject& s, const PlanRequest& request, const EffectChoice& choice);
-/// Those of EFFECT_COUNT that can be on or off for this subject.
+/// The effects, of EFFECT_COUNT, that can be on or off for this subject.
 std::vector<int> switchable_effects(const PlanSubject& s, const PlanRequest& request);
-/// The data set as a run under this plan sees it: through the lenses where the plan has them.
+/// The data set as a run under this plan sees it, through the lenses where the plan keeps them.
 Dataset planned_dataset(const PlanSubject& s, const PlanRequest& request, const EffectPlan& plan);
-/// On the device of the request; a scene without cameras is looked at from around it.
+/// Measures on the device of the request; a scene without cameras is looked at from around it.
 Measured measure_subject(const PlanSubject& s, const PlanRequest& request, const EffectPlan& plan);
 
 // The views that `darb cost` measures on: those of a data set, with their photos, or eight around

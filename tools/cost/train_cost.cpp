@@ -92,7 +92,8 @@ std::vector<TrainCostRow> training_rows(const Device& device, const Schedule& sc
     const TrainOptions& options = schedule.options;
     std::vector<TrainCostRow> rows(1);
     for (int s = 0; s < kAccuracyCount; ++s) {
-        if (s == kShDegree) continue;  // among the departures: it has its own schedule in training
+        // one of the departures, because it has its own schedule in training
+        if (s == kShDegree) continue;
         for (size_t c = 1; c < accuracy_settings()[s].choices.size(); ++c) {
             TrainCostRow row;
             row.accuracy.choice[s] = static_cast<int>(c);
@@ -261,8 +262,7 @@ class GradientErrors {
     std::vector<Photo> photos_;
 };
 
-// [row][seed]. On the first rank, the first run is done by this process, and only its splats are
-// kept.
+// [row][seed]. On the first rank, this process does the first run itself and keeps only its splats.
 std::vector<std::vector<TrainedRun>> train_by_turns(
     Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
     const TrainOptions& options, const TrainCostPlan& plan, const std::vector<TrainCostRow>& rows,
@@ -303,7 +303,7 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
                                    const TrainOptions& options, const TrainCostPlan& plan,
                                    const std::function<void(const std::string&)>& progress) {
     TrainCostResult result;
-    views_of(dataset, false);  // gives an Error before any photo is read
+    views_of(dataset, false);  // throws an Error before any photo is read
     views_of(dataset, true);
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     if (plan.ranks && plan.ranks->count() > 1) {

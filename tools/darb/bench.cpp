@@ -129,24 +129,27 @@ void add_bench(CLI::App& app, Action& action) {
     auto flags = std::make_shared<BenchFlags>();
     CLI::App* command = app.add_subcommand("bench", "Measure speed: frames, training steps, sorts");
     command->add_option("filter", flags->filter,
-                        "a scene of one's own, or a regular expression on the cases' names");
-    command->add_option("dataset", flags->dataset, "photos with cameras for a scene of one's own");
+                        "a scene of your own, or a regular expression for the names of cases");
+    command->add_option("dataset", flags->dataset, "photos with cameras for a scene of your own");
     command->add_flag("--list", flags->list, "only print the names");
     command->add_option("--data", flags->data,
                         "folder of the data sets and of splats/; default: $DARB_TEST_DATA, else "
                         "../shared/data");
     add_json_option(*command, flags->json);
-    command->add_option("--note", flags->note, "about the machine, kept in the file");
+    command->add_option("--note", flags->note, "a note about the machine, kept in the file");
     command->add_flag("--full", flags->options.full,
-                      "the long set-up: fox_800 after 7,000 iterations, not 1,000");
-    command->add_option("--seconds", flags->options.sampling.seconds, "of each case, at least")
+                      "a longer preparation: fox_800 after 7,000 iterations, not 1,000");
+    command
+        ->add_option("--seconds", flags->options.sampling.seconds,
+                     "at least this long for each case")
         ->capture_default_str()
         ->check(zero_or_more());
-    command->add_option("--samples", flags->options.sampling.least, "of each case, at least")
+    command
+        ->add_option("--samples", flags->options.sampling.least, "at least this many for each case")
         ->capture_default_str()
         ->check(CLI::Range(1, 200));
     add_growth_flags(*command, flags->growth);
-    command->add_flag("--brief", flags->brief, "a line a case, no passes");
+    command->add_flag("--brief", flags->brief, "print one line per case, without passes");
     add_quiet_flag(*command, flags->quiet);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
@@ -191,7 +194,8 @@ void add_growth_flags(CLI::App& command, GrowthFlags& flags) {
     command.add_flag(
         "--growth", flags.on,
         "time against splats, pixels and intersections instead, with fitted exponents");
-    command.add_option("--most-splats", flags.plan.most_splats, "of --growth")
+    command
+        .add_option("--most-splats", flags.plan.most_splats, "splats up to which --growth measures")
         ->capture_default_str()
         ->check(CLI::Range(1'000u, 100'000'000u));
     command.add_option("--html", flags.html, "write the plots of --growth to this page");

@@ -63,7 +63,7 @@ int dump_view(const CheckFlags& flags) {
                     "darb check --scene S.ply --cameras cameras.json --view 0 --dump DIR");
     if (!flags.json.empty() || flags.checks.every_kernel)
         throw Error(flags.json.empty() ? "darb check --every-kernel" : "darb check --json",
-                    "has nothing to say of --dump", "Leave one of them out.");
+                    "cannot be combined with --dump", "Leave one of them out.");
     const SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, nullptr, flags.units));
     const std::vector<View> views = open_cameras(flags.cameras, flags.data);
     if (flags.view < 0 || static_cast<size_t>(flags.view) >= views.size())
@@ -132,18 +132,20 @@ void add_check(CLI::App& app, Action& action) {
     CLI::App* command = app.add_subcommand(
         "check", "Check a device and its driver against double precision; exit code 1: failed");
     add_json_option(*command, flags->json);
-    command->add_flag("--every-kernel", flags->checks.every_kernel,
-                      "walks and hard cases in every kernel and footprint: minutes, not seconds");
-    add_kernel_flags(*command, flags->kernel, "check it alone; with --scene: draw with it");
+    command->add_flag(
+        "--every-kernel", flags->checks.every_kernel,
+        "check walks and hard cases with every kernel and footprint: minutes, not seconds");
+    add_kernel_flags(*command, flags->kernel, "check only this kernel; with --scene: draw with it");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
     command->add_option("--scene", flags->scene, "a PLY file whose view --dump writes");
     command->add_option("--cameras", flags->cameras, "a cameras.json, transforms.json or data set");
-    command->add_option("--view", flags->view, "number of the view, from 0")->capture_default_str();
+    command->add_option("--view", flags->view, "number of the view, counted from 0")
+        ->capture_default_str();
     command->add_option("--dump", flags->dump,
                         "write image and gradients of sum(image * linspace(0, 1)) to this folder");
     command->add_flag("--reference", flags->reference,
-                      "--dump from the double-precision reference, not from the device");
+                      "write --dump from the double-precision reference, not from the device");
     add_quiet_flag(*command, flags->quiet);
     add_unit_options(*command, flags->units);
     command->callback([flags, &action] { action = [flags] { return check_command(*flags); }; });

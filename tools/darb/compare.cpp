@@ -181,7 +181,8 @@ int compare(Ranks& ranks, CompareFlags flags) {
 void add_compare(CLI::App& app, Action& action) {
     auto flags = std::make_shared<CompareFlags>();
     CLI::App* command = app.add_subcommand(
-        "compare", "Kernels side by side on data sets: trains, measures, reports; resumes");
+        "compare",
+        "Train, measure and report several kernels on data sets; resumes where it stopped");
     add_compare_flags(*command, *flags);
     command->callback([flags, &action] {
         action = [flags] {
@@ -414,23 +415,27 @@ void forward(CLI::App& command, CompareFlags& flags, const std::string& names,
 }  // namespace
 
 void add_compare_flags(CLI::App& command, CompareFlags& flags) {
-    command.add_option("datasets", flags.datasets,
-                       "as darb train takes them; PATH@images_4 for its own photo folder");
+    command.add_option(
+        "datasets", flags.datasets,
+        "data sets as for darb train; PATH@images_4 names a photo folder for one of them");
     command.add_option("-o,--output", flags.output,
-                       "folder of the runs, OUT/DATASET/KERNEL/seedN: finished ones are kept");
+                       "folder of the runs, OUT/DATASET/KERNEL/seedN; finished runs are kept");
     command
         .add_option("--kernels", flags.kernels,
                     "paper (its five), all (nine), or names and expressions with commas")
         ->capture_default_str();
     add_kernel_file_flag(command, flags.kernel_files);
     command
-        .add_option("--pulses", flags.pulses,
-                    "of raised_cosine and sinc, with commas: 1,2,3 tests what rings cost and gain")
+        .add_option(
+            "--pulses", flags.pulses,
+            "pulses of raised_cosine and sinc, with commas: 1,2,3 tests what rings cost and gain")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->capture_default_str()
         ->check(CLI::Range(1, KERNEL_MAX_PULSES));
-    command.add_option("--iterations", flags.iterations, "evaluate after these, with commas")
+    command
+        .add_option("--iterations", flags.iterations,
+                    "evaluate after these iterations, with commas")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->capture_default_str()
@@ -438,7 +443,9 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     command.add_option("--seeds", flags.seeds, "runs of each")
         ->capture_default_str()
         ->check(CLI::Range(1, 100));
-    command.add_option("--max-splats", flags.max_splats, "growth stops there: equal count")
+    command
+        .add_option("--max-splats", flags.max_splats,
+                    "growth stops at this many splats, so that counts are equal")
         ->check(above_zero());
     forward(command, flags, "-r,--resolution", "--resolution", "as in darb train");
     add_scales_flag(command, flags.scales);
@@ -448,19 +455,22 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     forward(command, flags, "--footprint", "--footprint", "psi or exact");
     forward(command, flags, "--strategy", "--strategy", strategy_names());
     command.add_option("--train-options", flags.train_options,
-                       "more options of darb train, as one word in quotes");
+                       "more options of darb train, together in quotes");
     command
         .add_option("--lpips", flags.lpips,
-                    "safetensors with the weights of AlexNet or VGG16 and of LPIPS's layers; once "
-                    "for each file")
+                    "a safetensors file with the weights of AlexNet or VGG16 or of LPIPS's layers; "
+                    "once for each file")
         ->allow_extra_args(false);
     command.add_flag("--lpips-as-3dgs", flags.lpips_as_3dgs,
-                     "colours from 0 to 1 into LPIPS, as published numbers of splats have it");
-    command.add_option("--blending-views", flags.blending_views, "to count and time; 0: none")
+                     "feed colours from 0 to 1 into LPIPS, as published figures of splats do");
+    command
+        .add_option("--blending-views", flags.blending_views,
+                    "views whose blending is counted and timed; 0: none")
         ->capture_default_str()
         ->check(zero_or_more());
-    command.add_option("--html", flags.html, "default OUT/compare.html");
-    command.add_option("--json", flags.json, "default OUT/compare.json; - is stdout");
+    command.add_option("--html", flags.html, "the report's file (default OUT/compare.html)");
+    command.add_option("--json", flags.json,
+                       "the numbers' file (default OUT/compare.json); - is stdout");
     command.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
     add_quiet_flag(command, flags.quiet);
 }

@@ -428,7 +428,8 @@ void add_convert(CLI::App& app, Action& action) {
                       "replace a file that darb did not write from the same scene");
     command
         ->add_option("--kernel", flags->kernel,
-                     "gaussian: the nearest Gaussians; prints how far renders of both differ")
+                     "gaussian: turn splats into the nearest Gaussians and print how far renders "
+                     "of both differ")
         ->check(CLI::IsMember({"gaussian"}));
     add_edit_options(*command, flags->edits);
     command
@@ -439,20 +440,20 @@ void add_convert(CLI::App& app, Action& action) {
     add_level_options(*command, flags->levels);
     command
         ->add_option("--max-size", flags->choices.max_bytes,
-                     "largest size of what is written, as 10MB (1,000,000 bytes each): values are "
-                     "rounded and splats are merged to fit, and the loss is printed")
+                     "largest size of the output, such as 10MB (a MB is 1,000,000 bytes): values "
+                     "are rounded and splats merged to fit, and the loss is printed")
         ->transform(CLI::AsSizeValue(true))
         ->check(above_zero());
     add_page_options(*command, flags->page);
     command->add_flag("--no-measure", flags->no_measure,
-                      "render nothing: the loss is not printed, and SPZ keeps all its bits");
+                      "do not render: the loss is not printed, and SPZ keeps all its bits");
     command
         ->add_flag("--compare", flags->compare,
-                   "measure the loss in all views at their whole size, not in 8 of them")
+                   "measure the loss in all views at full size, not in 8 smaller ones")
         ->excludes("--no-measure");
     command->add_option("--cameras", flags->cameras,
-                        "cameras of the input, for its losses and a web page, as darb render takes "
-                        "them (default: those of the run, else 8 around the scene)");
+                        "cameras of the input, as for darb render, to measure losses and for a web "
+                        "page (default: those of the run, else 8 around the scene)");
     command->add_option("--device", flags->choices.device,
                         "number or part of a name, see `darb devices`");
     add_quiet_flag(*command, flags->quiet);
@@ -629,15 +630,16 @@ SplatModel join_scenes(std::vector<SplatModel> scenes,
 
 void add_edit_options(CLI::App& app, SceneEdits& edits) {
     app.add_option("--up", edits.up,
-                   "axis of the input that points up: x y z -x -y -z; turned to -y")
+                   "axis of the input that points up (x y z -x -y -z); it is turned to -y")
         ->capture_default_str();
     app.add_option("--rotate", edits.rotate, "X,Y,Z degrees, about x, then y, then z");
-    app.add_option("--scale", edits.scale, "factor")->check(above_zero());
+    app.add_option("--scale", edits.scale, "scale by this factor")->check(above_zero());
     app.add_option("--translate", edits.translate,
                    "X,Y,Z, after --up, --rotate and --scale, in this order");
     app.add_option("--crop", edits.crop,
                    "MINX,MINY,MINZ,MAXX,MAXY,MAXZ after all of these: centres to keep");
-    app.add_option("--prune-opacity", edits.prune_opacity, "leave out splats below, 0 to 1")
+    app.add_option("--prune-opacity", edits.prune_opacity,
+                   "leave out splats with a lower opacity, 0 to 1")
         ->check(CLI::Range(0.0, 1.0));
     app.add_option("--max-sh", edits.max_sh, "highest degree of view-dependent colour to keep")
         ->check(CLI::Range(0, 3));

@@ -113,25 +113,27 @@ void add_cost(CLI::App& app, Action& action) {
         app.add_subcommand("cost", "Measure what each accuracy setting costs in time");
     command->add_option("scene", flags->scene, "PLY file, or the output folder of darb train");
     auto* dataset = command->add_option(
-        "dataset", flags->dataset, "photos with cameras; without: eight views around the splats");
+        "dataset", flags->dataset, "photos with cameras (default: eight views around the splats)");
     auto* train = command->add_option("--train", flags->train,
-                                      "price the settings in training on this data set instead");
+                                      "measure the settings in training on this data set instead");
     command
         ->add_option("--train-options", flags->train_options,
-                     "options of darb train, as \"--kernel sinc --effects none\"")
+                     "options of darb train, such as \"--kernel sinc --effects none\"")
         ->needs(train);
-    command->add_option("--seeds", flags->seeds, "runs a setting with --train (default 3)")
+    command->add_option("--seeds", flags->seeds, "runs per setting with --train (default 3)")
         ->check(CLI::Range(1, 100))
         ->needs(train);
-    command->add_option("--iterations", flags->iterations, "of a run with --train (default 1,500)")
+    command
+        ->add_option("--iterations", flags->iterations,
+                     "iterations of a run with --train (default 1,500)")
         ->check(CLI::Range(20, 1'000'000))
         ->needs(train);
     add_json_option(*command, flags->json);
     command->add_option("--html", flags->html, "write a page with plots to this file");
     auto* quick = command->add_flag("--quick", flags->quick,
-                                    "seconds: fewer views, repeats and combinations");
-    command->add_flag("--full", flags->full, "minutes: more of all three")->excludes(quick);
-    command->add_option("--size", flags->size, "of the views around the splats, px")
+                                    "take seconds: fewer views, repeats and combinations");
+    command->add_flag("--full", flags->full, "take minutes: more of all three")->excludes(quick);
+    command->add_option("--size", flags->size, "size of the views around the splats, px")
         ->capture_default_str()
         ->excludes(train)
         ->excludes(dataset);
@@ -144,8 +146,7 @@ void add_cost(CLI::App& app, Action& action) {
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
     add_quiet_flag(*command, flags->quiet);
     add_unit_options(*command, flags->units);
-    add_kernel_flags(*command, flags->kernel,
-                     "measure with this kernel in the place of the scene's");
+    add_kernel_flags(*command, flags->kernel, "measure with this kernel instead of the scene's");
     for (const char* option : {"--kernel", "--kernel-file"})
         command->get_option(option)->excludes(train);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");

@@ -85,12 +85,12 @@ void add_devices(CLI::App& app, Action& action) {
     auto flags = std::make_shared<Flags>();
     CLI::App* command = app.add_subcommand("devices", "List the Vulkan devices and their limits");
     command->add_option("--device", flags->select,
-                        "show what this number or part of a name would choose");
+                        "show which device this number or part of a name would choose");
     add_quiet_flag(*command, flags->quiet);
     CLI::Option* passes = command->add_flag(
         "--passes", flags->passes,
-        "compile every pass for the chosen device and say what its compiler tells of them: "
-        "registers, spills, occupancy, instructions; nothing is executed");
+        "compile every pass for the chosen device and print what its compiler reports: registers, "
+        "spills, occupancy, instructions; nothing is executed");
     add_json_option(*command, flags->json)->needs(passes);
     command->callback([flags, &action] {
         action = [flags] {

@@ -171,8 +171,8 @@ void add_scales_or_units(CLI::App& command, std::vector<double>& scales, StoredU
                     scales.push_back(size_to_measure_at(word));
                 }
             },
-            "sizes to measure at, as multiples of that of -r, with commas: 0.5,1,2,4; or, as in "
-            "darb info, linear or logarithms: what stands in the file in the place of scales")
+            "sizes to measure at, as multiples of the size of -r, with commas: 0.5,1,2,4; or, as "
+            "in darb info, linear or logarithms: what the file stores as scales")
         ->delimiter(',')
         ->allow_extra_args(false);
 }
@@ -188,7 +188,7 @@ void add_eval(CLI::App& app, Action& action) {
         ->required();
     command
         ->add_option("--split", flags->split,
-                     "test: the views that are held out; train: the others; all")
+                     "test: the views that are held out; train: the others; all: both")
         ->capture_default_str()
         ->check(CLI::IsMember({"test", "train", "all"}));
     add_json_option(*command, flags->json);
@@ -199,9 +199,9 @@ void add_eval(CLI::App& app, Action& action) {
                         "as in training: 1, 2, 4, 8 or a width in px");
     add_scales_or_units(*command, flags->scales, flags->units);
     add_hold_out_flag(*command, flags->data)->default_str("as the scene was trained, else every:8");
-    command->add_flag("--light-share", flags->light,
-                      "also the share of the light that comes from splats which fewer than three "
-                      "training views see");
+    command->add_flag(
+        "--light-share", flags->light,
+        "also print the share of the light from splats that fewer than three training views see");
     command->add_flag("-w,--white-background", flags->white, "white behind alpha, not black");
     add_accuracy_flags(*command, flags->accuracy);
     add_effects_flag(*command, flags->effects);

@@ -157,7 +157,7 @@ CLI::Option* add_depth_scale_flag(CLI::App& command, DatasetOptions& data) {
 CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales) {
     return command
         .add_option("--scales", scales,
-                    "sizes to measure at, as multiples of that of -r, with commas: 0.5,1,2,4")
+                    "sizes to measure at, as multiples of the size of -r, with commas: 0.5,1,2,4")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(CLI::Range(0.01, 100.0));
@@ -184,22 +184,22 @@ void add_unit_options(CLI::App& command, StoredUnits& units, bool with_scales) {
         add_unit_option<StoredScales>(
             command, "--scales", units.scales,
             {{"linear", StoredScales::linear}, {"logarithms", StoredScales::logarithms}},
-            "what stands in the place of scales: lengths, or their logarithms");
+            "what the file stores as scales: lengths, or their logarithms");
     add_unit_option<StoredOpacities>(
         command, "--opacities", units.opacities,
         {{"linear", StoredOpacities::linear}, {"bytes", StoredOpacities::bytes}},
-        "what stands in the place of logits: 0 to 1, or 0 to 255");
-    add_unit_option<StoredColours>(command, "--colours", units.colours,
-                                   {{"rgb", StoredColours::rgb}, {"bytes", StoredColours::bytes}},
-                                   "what stands in the place of f_dc: red, green and blue, 0 to 1 "
-                                   "or 0 to 255");
+        "what the file stores as opacities: 0 to 1, or 0 to 255");
+    add_unit_option<StoredColours>(
+        command, "--colours", units.colours,
+        {{"rgb", StoredColours::rgb}, {"bytes", StoredColours::bytes}},
+        "what the file stores as f_dc: red, green and blue, 0 to 1 or 0 to 255");
     add_unit_option<StoredRotations>(command, "--rotations", units.rotations,
                                      {{"xyzw", StoredRotations::xyzw}},
-                                     "the last of the four numbers of a rotation comes first");
+                                     "xyzw: the number w of a rotation comes last");
     add_unit_option<StoredOrder>(command, "--harmonics", units.harmonics,
                                  {{"swapped", StoredOrder::swapped}},
-                                 "f_rest: the channels of a coefficient side by side; in formats "
-                                 "that have them so, those of a channel");
+                                 "swapped: f_rest has the channels of a coefficient side by side, "
+                                 "or, in formats that do so anyway, the coefficients of a channel");
 }
 
 PixelSize parse_size(const std::string& text) {

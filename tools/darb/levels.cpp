@@ -52,23 +52,23 @@ constexpr int kMostLevels = 20;  // a millionth of the splats is left after so m
 }  // namespace
 
 void add_level_options(CLI::App& app, LevelFlags& flags) {
-    app.add_option("--splats", flags.splats, "merge the scene to so many splats")
+    app.add_option("--splats", flags.splats, "merge the scene to this many splats")
         ->check(above_zero());
     app.add_option("--share", flags.share,
-                   "merge it to this share of its splats; of --levels each to this share of the "
-                   "one before (default there: 0.5)")
+                   "merge it to this share of its splats; with --levels, each level to this share "
+                   "of the previous one (default there: 0.5)")
         ->check(CLI::Range(0.0, 1.0));
     app.add_option("--levels", flags.levels,
-                   "write so many levels, fewer and fewer splats: OUT.1.ply, OUT.2.ply, ...; of "
-                   "OUT/lod-meta.json, so many below the scene itself")
+                   "write this many levels with fewer and fewer splats: OUT.1.ply, OUT.2.ply, ...; "
+                   "for OUT/lod-meta.json, this many below the scene itself")
         ->check(CLI::Range(1, kMostLevels));
     app.add_option("--refine", flags.refine,
-                   "a data set: train the merged splats on its photos for a little while");
-    app.add_option("--refine-iterations", flags.iterations, "of --refine")
+                   "train the merged splats for a short while on the photos of this data set");
+    app.add_option("--refine-iterations", flags.iterations, "iterations of --refine")
         ->check(above_zero())
         ->capture_default_str();
     app.add_option("--refine-resolution", flags.data.resolution,
-                   "of its photos, as -r of darb train")
+                   "size of its photos, as -r of darb train")
         ->needs(app.get_option("--refine"));
 }
 

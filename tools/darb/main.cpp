@@ -83,8 +83,8 @@ int run(int argc, char** argv) {
     app.set_version_flag("--version", std::string("darb ") + DARB_VERSION + with_mpi());
     app.require_subcommand(1);
     app.formatter(darb::make_help_formatter());
-    app.set_help_flag("-h,--help", "this, without the options of few users");
-    app.set_help_all_flag("--help-all", "with every option");
+    app.set_help_flag("-h,--help", "this help, without rarely used options");
+    app.set_help_all_flag("--help-all", "this help, with every option");
     darb::Action action;
     add_commands(app, action, arguments);
     if (arguments == std::vector<std::string>{"--options-json"}) {
@@ -134,8 +134,9 @@ int main(int argc, char** argv) {
     } catch (const std::system_error& e) {
         return report(e);
     } catch (const std::bad_alloc&) {
-        darb::say("error: darb {}: no memory is left\n  Close other programs, or give it less.\n",
-                  argc > 1 ? argv[1] : "");
+        darb::say(
+            "error: darb {}: no memory is left\n  Close other programs, or give it less work.\n",
+            argc > 1 ? argv[1] : "");
         return 2;
     } catch (const std::exception& e) {
         darb::say("internal error: {}\n", e.what());

@@ -36,18 +36,19 @@ glm::vec3 parse_colour(const std::string& text) {
 
 void add_page_options(CLI::App& command, PageFlags& flags) {
     const std::string group = "Web page (.html)";
-    command.add_option("--title", flags.title, "its title (default: the name of the scene)")
+    command
+        .add_option("--title", flags.title, "title of the page (default: the name of the scene)")
         ->group(group);
     command
         .add_option("--start-camera", flags.start_camera,
-                    "name or number of the camera it opens at (default: 1)")
+                    "name or number of the camera at which it opens (default: 1)")
         ->group(group);
     command.add_option("--background", flags.background, "black, white or '#rrggbb'")
         ->capture_default_str()
         ->group(group);
     command
         .add_flag("--exact", flags.exact,
-                  "keep float32 values; without, they are rounded, and the error is printed")
+                  "keep float32 values; otherwise they are rounded and the error is printed")
         ->group(group);
 }
 

@@ -181,32 +181,34 @@ int run_plan(PlanFlags flags) {
 
 void add_plan(CLI::App& app, Action& action) {
     auto flags = std::make_shared<PlanFlags>();
-    CLI::App* command =
-        app.add_subcommand("plan", "Which effects a data set or a scene calls for, and their cost");
+    CLI::App* command = app.add_subcommand(
+        "plan", "Show which effects a data set or a scene needs, and their cost");
     command->add_option("what", flags->plan.what, "a data set, a scene, or an output folder")
         ->required();
     command->add_option("--cameras", flags->plan.cameras,
-                        "of a scene: the cameras that it will be rendered through");
-    command->add_option("-r,--resolution", flags->plan.data.resolution, "as in training");
-    command->add_option("-i,--images", flags->plan.data.images_folder, "as in training")
+                        "for a scene: the cameras that will look at it");
+    command->add_option("-r,--resolution", flags->plan.data.resolution, "the same as in training");
+    command->add_option("-i,--images", flags->plan.data.images_folder, "the same as in training")
         ->capture_default_str();
     command
         ->add_option("--sh-degree", flags->plan.sh_degree,
-                     "of a data set: the highest degree (default 3)")
+                     "for a data set: the highest degree (default 3)")
         ->check(CLI::Range(0, 3));
     add_kernel_flags(*command, flags->kernel,
-                     "of a data set: the kernel to train with (default gaussian)");
-    command->add_flag("--depth", flags->plan.depth, "of a scene: depth images are wanted too");
+                     "for a data set: the kernel to train with (default gaussian)");
+    command->add_flag("--depth", flags->plan.depth, "for a scene: depth images are wanted, too");
     add_effects_flag(*command, flags->plan.effects);
     add_lens_flag(*command, flags->plan.data);
-    command->add_flag("--no-price", flags->no_price, "measure no times");
-    command->add_flag("--compare", flags->compare, "time and memory of none, auto and all");
+    command->add_flag("--no-price", flags->no_price, "do not measure times");
+    command->add_flag("--compare", flags->compare, "compare time and memory of none, auto and all");
     auto* probe = command->add_flag(
         "--probe", flags->probe,
-        "of a data set: decide on anti-aliasing by two short runs, measured at 1/2, 1, 2 and 4 "
-        "times the size of -r; by two more each whether a --kernel that learns shapes pays, and "
+        "for a data set: decide on anti-aliasing by two short runs, measured at 1/2, 1, 2 and 4 "
+        "times the size of -r; two more runs each decide on a --kernel that learns shapes, and on "
         "--exposure-grid where exposure is on");
-    command->add_option("--probe-iterations", flags->probe_iterations, "of each of the runs")
+    command
+        ->add_option("--probe-iterations", flags->probe_iterations,
+                     "iterations of each of these runs")
         ->capture_default_str()
         ->check(CLI::Range(20, 1'000'000))
         ->needs(probe);

@@ -52,17 +52,20 @@ int psi(const PsiFlags& flags) {
 
 void add_psi(CLI::App& app, Action& action) {
     auto flags = std::make_shared<PsiFlags>();
-    CLI::App* command = app.add_subcommand(
-        "psi", "The correction factor of a kernel three ways, and its splats beside the truth");
+    CLI::App* command = app.add_subcommand("psi",
+                                           "Compute the correction factor of a kernel in three "
+                                           "ways, and compare its splats with the truth");
     command
         ->add_option("--kernel,--kernels", flags->kernels,
                      "names and expressions with commas, or all")
         ->capture_default_str();
     add_kernel_file_flag(*command, flags->kernel_files);
-    command->add_option("--samples", flags->grid.samples, "random covariances of the grid")
+    command
+        ->add_option("--samples", flags->grid.samples,
+                     "random covariances to integrate on the grid")
         ->capture_default_str()
         ->check(CLI::Range(1, 100'000));
-    command->add_option("--cells", flags->grid.cells, "of the grid, along each axis")
+    command->add_option("--cells", flags->grid.cells, "cells of the grid along each axis")
         ->capture_default_str()
         ->check(CLI::Range(8, 1024));
     command->add_option("--seed", flags->grid.seed)->capture_default_str();

@@ -269,7 +269,7 @@ int render(RenderFlags flags) {
 void add_render(CLI::App& app, Action& action) {
     auto flags = std::make_shared<RenderFlags>();
     CLI::App* command = app.add_subcommand(
-        "render", "Render a scene to PNG files: of cameras, along a path, or once around it");
+        "render", "Render a scene to PNG files: from cameras, along a path, or once around it");
     command->add_option("scene", flags->scene, "splat file, or the output folder of darb train")
         ->required();
     CLI::Option* const cameras =
@@ -284,7 +284,7 @@ void add_render(CLI::App& app, Action& action) {
         ->check(CLI::IsMember({kPerspective, kEquirectangular, kCubemap}))
         ->capture_default_str();
     add_film_flags(*command, flags->film, cameras);
-    command->add_option("-o,--output", flags->output, "folder of the frames, made where missing")
+    command->add_option("-o,--output", flags->output, "folder of the frames; it is made if missing")
         ->required();
     command->add_flag("--force", flags->force, "replace pictures that darb did not write")
         ->needs(cameras);
@@ -293,19 +293,19 @@ void add_render(CLI::App& app, Action& action) {
                         "they are, those of a data set at most 1,600 px wide");
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
     command
-        ->add_option("--near", flags->near_plane,
-                     "nearest distance drawn, world units [0.2; without --cameras less of a small "
-                     "scene]")
+        ->add_option(
+            "--near", flags->near_plane,
+            "nearest distance drawn, world units [0.2; without --cameras less for a small scene]")
         ->check(above_zero());
-    add_kernel_flags(*command, flags->kernel, "draw with it in the place of the scene's own");
+    add_kernel_flags(*command, flags->kernel, "draw with this kernel instead of the scene's own");
     add_accuracy_flags(*command, flags->accuracy);
     add_effects_flag(*command, flags->effects);
     add_lens_flag(*command, flags->data);
     command->get_option("--lens")->needs(cameras);
     command
         ->add_option("--depth", flags->depth.format,
-                     "depth beside the frames, NAME_depth: png (16 bits, 0 = nothing seen) or npy "
-                     "(float32, world units); NAME_depth_colours.png is for people")
+                     "write depth beside the frames, NAME_depth: png (16 bits, 0 = nothing seen) "
+                     "or npy (float32, world units); NAME_depth_colours.png is for people")
         ->check(CLI::IsMember({"png", "npy"}));
     command->add_option("--depth-unit", flags->depth.unit, "world units of one step of a depth PNG")
         ->capture_default_str()
@@ -401,8 +401,8 @@ void DepthFiles::write(const std::filesystem::path& frame, const ImageF& depth) 
 
 void DepthFiles::print_clipped() const {
     if (range_.clipped == 0) return;
-    say("warning: {} pixels of the depth PNGs lie beyond {:g} world units, their last step, "
-        "up to {:g}: --depth-unit {:g} holds all, as does --depth npy\n",
+    say("warning: {} pixels of the depth PNGs lie beyond their last step at {:g} world units, up "
+        "to {:g}: --depth-unit {:g} holds all, as does --depth npy\n",
         range_.clipped, kDepthSteps * flags_.unit, range_.farthest, unit_for(range_.farthest));
 }
 
@@ -453,27 +453,27 @@ CameraPath turn_around(const RenderFlags& render, const PixelSize& size, const S
 }  // namespace
 
 void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
-    CLI::Option* const path = c.add_option(
-        "--path", flags.path,
-        "a camera path that the viewer saved, or a camera_path.json of nerfstudio; "
-        "without it and --cameras the camera goes once around what the scene's cameras "
-        "look at. Both make a video, too, where ffmpeg is");
+    CLI::Option* const path =
+        c.add_option("--path", flags.path,
+                     "a camera path that the viewer saved, or a camera_path.json of nerfstudio; "
+                     "without it and --cameras the camera goes once around what the scene's "
+                     "cameras look at. Both also make a video if ffmpeg is installed");
     path->excludes(cameras);
     c.add_option("--size", flags.size,
-                 "WIDTHxHEIGHT of the frames of a path, a turn or another --projection, px")
-        ->default_str("nerfstudio's path: as it says, else 1280x720");
-    c.add_option("--fps", flags.fps, "their frames a second")
+                 "size of the frames of a path, a turn or another --projection, WIDTHxHEIGHT px")
+        ->default_str("what nerfstudio's path says, else 1280x720");
+    c.add_option("--fps", flags.fps, "frames a second of a path or a turn")
         ->check(CLI::Range(1, 240))
-        ->default_str("nerfstudio's path: as it says, else 30")
+        ->default_str("what nerfstudio's path says, else 30")
         ->excludes(cameras);
-    c.add_option("--seconds", flags.seconds, "of the turn")
+    c.add_option("--seconds", flags.seconds, "duration of the turn")
         ->check(CLI::Range(0.1, 600.0))
         ->capture_default_str()
         ->excludes(cameras)
         ->excludes(path);
     c.add_option("--up", flags.up,
-                 "x, -x, y, -y, z or -z, of the turn (default: as the cameras were held, else what "
-                 "the file says, else a guess)")
+                 "up axis of the turn: x, -x, y, -y, z or -z (default: as the cameras were held, "
+                 "else what the file says, else a guess)")
         ->excludes(cameras)
         ->excludes(path);
     c.add_option("--around", flags.around,

@@ -77,7 +77,7 @@ int sim1d(Sim1dFlags flags) {
 void add_sim1d(CLI::App& app, Action& action) {
     auto flags = std::make_shared<Sim1dFlags>();
     CLI::App* command =
-        app.add_subcommand("sim1d", "Signals as sums of N kernels: the paper's study in 1D");
+        app.add_subcommand("sim1d", "Fit signals by sums of N kernels: the paper's study in 1D");
     command->add_option("--signals", flags->signals, "names with commas, or all")
         ->capture_default_str();
     command
@@ -93,13 +93,13 @@ void add_sim1d(CLI::App& app, Action& action) {
     command->add_option("--seeds", study.seeds, "runs of each")
         ->capture_default_str()
         ->check(CLI::Range(1, 10'000));
-    command->add_option("--steps", study.fit.steps, "of Adam")
+    command->add_option("--steps", study.fit.steps, "steps of Adam")
         ->capture_default_str()
         ->check(CLI::Range(1, 10'000'000));
-    command->add_option("--samples", study.fit.samples, "on [-10, 10]")
+    command->add_option("--samples", study.fit.samples, "samples on [-10, 10]")
         ->capture_default_str()
         ->check(CLI::Range(16, 1'000'000));
-    command->add_option("--lr", study.fit.learning_rate, "of Adam")
+    command->add_option("--lr", study.fit.learning_rate, "learning rate of Adam")
         ->capture_default_str()
         ->check(above_zero());
     command

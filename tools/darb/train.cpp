@@ -123,7 +123,7 @@ void complete_flags(TrainRequest& request, bool quiet) {
     const bool named = !request.output.empty();
     complete_request(request);
     require_places(request);
-    if (!named && !quiet) say("output: {}; -o names another\n", request.output.string());
+    if (!named && !quiet) say("output: {}; -o chooses another\n", request.output.string());
 }
 
 int train(Ranks& ranks, TrainFlags flags, const std::vector<std::string>& typed) {

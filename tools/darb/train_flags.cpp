@@ -21,12 +21,12 @@ struct Removed {
 };
 
 constexpr Removed kRemoved[] = {
-    {"--position-lr-falls", "is no option any more",
+    {"--position-lr-falls", "is no longer an option",
      "It follows from --average-from: 1 lets the rate fall for the whole run, as 3DGS does."},
-    {"--final-lr-share", "is no option any more",
+    {"--final-lr-share", "is no longer an option",
      "It follows from --average-from: rates stay in a run that ends with a mean, and fall in one "
      "that does not."},
-    {"--opacity-decay", "is no option any more",
+    {"--opacity-decay", "is no longer an option",
      "The strategy budget is adc, steered to a number: it resets opacities as adc does."},
 };
 

@@ -172,7 +172,7 @@ void print_growth(const Schedule& schedule) {
     for (int i = 1; i < schedule.iterations; ++i)
         if (schedule.refines_after(i)) return;
     if (schedule.rounds.end > 0)
-        say("growth: none, it would end after {} iterations and begin after {}: a longer "
+        say("growth: none, because it would end after {} iterations and begin after {}; a longer "
             "run or --densify-from-iter changes that\n",
             schedule.rounds.end, schedule.rounds.begin);
 }
@@ -192,7 +192,7 @@ void print_scene(const Device& device, const TrainJob& job, std::size_t held_out
 }  // namespace
 
 void say_stereo_begins() {
-    say_note("start: stereo between the photos, about a second of a core for each");
+    say_note("start: stereo between the photos takes about a second of one core for each");
 }
 
 void print_plan(Device& device, TrainJob& job, bool quiet) {

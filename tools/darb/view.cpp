@@ -258,12 +258,12 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
     c.add_option("scene", flags.scene, "a splat file or point cloud, or a folder of darb train");
     c.add_option("--cameras", flags.cameras,
                  "a data set, to look through its cameras and compare with its photos");
-    c.add_option("--camera", flags.camera, "start at this camera of the data set, from 0")
+    c.add_option("--camera", flags.camera, "start at this camera of the data set, counted from 0")
         ->check(zero_or_more());
-    c.add_option(
-        "--up", flags.up,
-        "x, -x, y, -y, z or -z (default: from the cameras, else as turned before, else guessed)");
-    c.add_option("--size", flags.size, "WIDTHxHEIGHT of window, screenshot and frames, px")
+    c.add_option("--up", flags.up,
+                 "up axis: x, -x, y, -y, z or -z (default: from the cameras, else as turned "
+                 "before, else guessed)");
+    c.add_option("--size", flags.size, "size of window, screenshot and frames, WIDTHxHEIGHT px")
         ->capture_default_str();
     c.add_option("--screenshot", flags.screenshot,
                  "write the window's content to this .png or .jpg, without a window");
@@ -271,14 +271,15 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
         ->needs(c.get_option("--screenshot"));
     c.add_option("--path", flags.path,
                  "a camera path that the viewer saved, or a camera_path.json of nerfstudio");
-    c.add_option("--export", flags.frames,
-                 "write the path's frames (and a video, with ffmpeg) to this folder, no window")
+    c.add_option(
+         "--export", flags.frames,
+         "write the path's frames, and with ffmpeg a video, to this folder, without a window")
         ->needs(c.get_option("--path"));
     c.add_option("--fps", flags.fps, "frames a second of --export")
         ->check(CLI::Range(1, 240))
         ->capture_default_str();
     c.add_option("--times", flags.times,
-                 "orbit for some seconds, rest, write frame times to this JSON, and close")
+                 "orbit for some seconds, rest, write the frame times to this JSON file, and close")
         ->needs(c.get_option("scene"));
     c.add_option("--show", flags.show, "what is drawn")
         ->check(CLI::IsMember({"picture", "error", "depth", "work"}))
@@ -286,12 +287,13 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
     c.add_option("--splats-as", flags.style, "how splats are drawn")
         ->check(CLI::IsMember({"splats", "points", "ellipsoids"}))
         ->capture_default_str();
-    c.add_flag("--compare", flags.compare, "photo beside the picture, at a camera of the data set");
+    c.add_flag("--compare", flags.compare,
+               "show the photo beside the picture, at a camera of the data set");
     c.add_option("--beside", flags.beside,
-                 "these kernels, with commas, side by side with the scene's own: up to three");
+                 "show up to three kernels, named with commas, side by side with the scene's own");
     add_kernel_file_flag(c, flags.kernel_files);
     c.add_flag("--difference", flags.difference,
-               "all but the leftmost of what is side by side show their error to it");
+               "show how all pictures but the leftmost differ from it");
     c.add_flag("--no-panels", flags.no_panels, "start with the panels hidden (key H)");
     c.add_option("--gui-scale", flags.gui_scale, "size of the panels (default: the display's)")
         ->check(CLI::Range(0.5, 4.0));

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A copy of the sources with changes that stay out of the tree, and the command built from it: for scripts that measure
-what a change brings. No script of its own.
+"""A copy of the sources with changes that stay out of the tree, and the command built from it, for scripts that measure
+what a change brings. It does nothing by itself.
 """
 
 import os
@@ -12,7 +12,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 
 
 def changed_texts(script, changes):
-    """The text of each file with its changes (file, text, other text); ends where one does not fit the sources any more."""
+    """The text of each file with its changes (file, text, other text); exits where one no longer fits the sources."""
     texts = {}
     for path, held, other in changes:
         if path not in texts:
@@ -25,7 +25,7 @@ def changed_texts(script, changes):
 
 
 def built_copy(copy, texts):
-    """The command, built in the folder `copy` of the tree from the sources with these texts; a second call builds what changed."""
+    """Builds the command in the folder `copy` of the tree, from the sources with these texts; a second call rebuilds changes."""
     copy = os.path.join(ROOT, copy)
     files = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, check=True,
                            capture_output=True, text=True).stdout

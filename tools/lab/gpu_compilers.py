@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Compiles every pass with the compilers of GPUs that this machine does not have, and says what they make of them.
+"""Compiles every pass with the compilers of GPUs that this machine does not have, and prints what they make of them.
 
     gpu_compilers.py fetch DIR [--all]       unpacks Mesa's drivers below DIR: AMD's, with --all every vendor's
     gpu_compilers.py run DIR GPU [--json F]  darb devices --passes as that GPU's driver would compile
@@ -11,10 +11,11 @@
     --darb PATH   the command (build/darb)
     --again       check: what the last call measured, without compiling
 
-Mesa's drivers run over its no-op kernel driver (Debian: mesa-drm-shim): nothing is executed, so a result of theirs
-means nothing, but each pass is compiled as for the real thing. GPUs: navi31 navi21 vega10 of AMD; with --all dg2 bmg
-of Intel, turing ada hopper blackwell of NVIDIA by Mesa's NVK, m1 of Apple, a630 a740 of Adreno. Packages are unpacked,
-not installed. Intel's no-op kernel driver is in no package: it is built from Debian's source of Mesa, in two minutes.
+Mesa's drivers run over its no-op kernel driver (Debian: mesa-drm-shim). Nothing is executed, so results of the passes mean
+nothing, but each pass is compiled as it would be on the GPU. GPUs: AMD's navi31, navi21 and vega10; with --all also
+Intel's dg2 and bmg, NVIDIA's turing, ada, hopper and blackwell by Mesa's NVK, Apple's m1, and Adreno's a630 and a740.
+Packages are unpacked, not installed. No package has Intel's no-op kernel driver, so it is built from Debian's source of
+Mesa, which takes two minutes.
 """
 
 import argparse
@@ -51,7 +52,7 @@ NAMES = {"navi31": "RDNA 3 (navi31)", "navi21": "RDNA 2 (navi21)", "vega10": "Ve
 
 PACKAGES = {
     STABLE: "mesa-vulkan-drivers mesa-drm-shim libdrm2 libdrm-common libdrm-amdgpu1",
-    # A suite with a newer C library: with its loader and everything that the drivers link.
+    # A suite with a newer C library comes with its loader and everything that the drivers link.
     NEW: "mesa-vulkan-drivers mesa-drm-shim libdrm2 libdrm-common libdrm-amdgpu1 libvulkan1 libc6 libgcc-s1 "
          "libstdc++6 libllvm22 libz3-4 libzstd1 zlib1g libelf1t64 libexpat1 libffi8 libedit2 libtinfo6 libxml2-16 "
          "libbsd0 libmd0 libdisplay-info3 libwayland-client0 libx11-6 libx11-xcb1 libxau6 libxdmcp6 libxcb1 "
@@ -64,7 +65,7 @@ def fail(text):
 
 
 def apt(folder, *words):
-    """apt-get with lists and sources of its own, below `folder`."""
+    """apt-get with its own lists and sources, below `folder`."""
     options = {"Dir::Etc::SourceList": folder / "sources.list", "Dir::Etc::SourceParts": "/nonexistent",
                "Dir::State::Lists": folder / "lists", "Dir::Cache::archives": folder / "archives",
                "Dir::Cache::pkgcache": "", "Dir::Cache::srcpkgcache": ""}
@@ -73,7 +74,7 @@ def apt(folder, *words):
 
 
 def mirror():
-    """The one that this machine's apt uses."""
+    """The mirror that this machine's apt uses."""
     listed = subprocess.run(["apt-get", "indextargets", "--format", "$(RELEASE) $(REPO_URI)", "Created-By: Packages"],
                             capture_output=True, text=True, check=False).stdout
     for line in listed.splitlines():
@@ -107,7 +108,8 @@ def fetch(root, suite):
         (root / f"{suite}-{name}.json").write_text(json.dumps(manifest))
 
 
-# What builds Intel's no-op kernel driver beside a compiler: what is found there, and its package. Meson comes along.
+# What building Intel's no-op kernel driver needs besides a compiler: what to look for, and its package. Meson is
+# fetched, too.
 BUILD_NEEDS = {"/usr/bin/ninja": "ninja-build", "/usr/bin/bison": "bison", "/usr/bin/flex": "flex",
                "/usr/include/expat.h": "libexpat1-dev", "/usr/include/zlib.h": "zlib1g-dev",
                "/usr/include/libdrm/drm.h": "libdrm-dev", "/usr/lib/python3/dist-packages/mako": "python3-mako",
@@ -115,7 +117,7 @@ BUILD_NEEDS = {"/usr/bin/ninja": "ninja-build", "/usr/bin/bison": "bison", "/usr
 
 
 def build_intel(root):
-    """The no-op kernel driver of Intel, of the same source as the driver that fetch() unpacked."""
+    """Intel's no-op kernel driver, from the same source as the driver that fetch() unpacked."""
     missing = [package for path, package in BUILD_NEEDS.items() if not pathlib.Path(path).exists()]
     if missing:
         print(f"gpu_compilers.py: no dg2 and bmg: building Intel's no-op kernel driver needs {' '.join(missing)}",
@@ -162,7 +164,7 @@ def passes(root, gpu, darb, out):
            "XDG_CACHE_HOME": str(root / f"cache-{gpu}")}
     shim_library = str(libraries / f"lib{shim}_noop_drm_shim.so")
     command = [str(darb), "devices", "--passes", "--json", str(out)]
-    if suite == NEW:  # by that suite's own loader, as its C library is newer
+    if suite == NEW:  # started by that suite's own loader, because its C library is newer
         loader = next((root / suite).rglob("ld-linux-x86-64.so.2"), None) or fail(f"no libc6 of {suite} below {root}")
         command = [str(loader), "--library-path", f"{libraries}:/{LIB}", "--preload", shim_library, *command]
     else:
@@ -171,7 +173,7 @@ def passes(root, gpu, darb, out):
 
 
 def measured(root, gpu, darb, again=False):
-    """again: what the last call measured, where that is there."""
+    """again: uses what the last call measured, where that exists."""
     out = root / f"passes-{gpu}.json"
     if again and out.exists():
         return json.loads(out.read_text())
@@ -183,15 +185,15 @@ def measured(root, gpu, darb, again=False):
 
 
 def key(row):
-    """A pass among those of one GPU: shader, lanes of a subgroup, and its constants but for a kernel's coefficients
-    and for those that are 0, so that what is new and off changes no name."""
+    """Identifies a pass on one GPU: shader, lanes of a subgroup, and its constants except a kernel's coefficients and those
+    that are 0, so that a new constant that is off changes no name."""
     constants = [one for one in row["constants"].split()
                  if not re.match(r"KERNEL_|[A-Z_]+=-?\d*\.\d|\w+=\S*e-|\w+=0$", one)]
     return f"{row['shader']} [{' '.join(constants)}] {row['subgroup_size']}"
 
 
 def limits(report):
-    """What the table keeps of a GPU: registers, occupancy and scratch of each pass, the worst of one key."""
+    """What the table keeps for a GPU: registers, occupancy and scratch of each pass, the worst for each key."""
     table = {}
     for row in report["passes"]:
         kept = table.setdefault(key(row), {})
@@ -244,7 +246,7 @@ def record(root, darb):
     return 0
 
 
-# Rows of the tables: what stands before them, and which of the compiled passes they are.
+# The rows of the tables: what they begin with, and which of the compiled passes they show.
 ROWS = (("project, degree 3", r"^project \[.*SH_DEGREE=3"), ("emit", r"^emit \["),
         ("radix scatter, ballot", r"^radix_scatter_ballot "), ("blend", r"^blend \["),
         ("blend backward, team", r"^blend_backward_team "),
@@ -293,7 +295,7 @@ def main():
         print("there: " + " ".join(gpu for gpu in GPUS if is_there(root, gpu)))
         return 0 if is_there(root, CHECKED[0]) else 1
     if not flags.darb.exists():
-        fail(f"{flags.darb} is not there; build it, or name another with --darb")
+        fail(f"{flags.darb} does not exist; build it, or name another with --darb")
     if flags.verb == "run":
         if not flags.gpu:
             fail("run: name a GPU: " + " ".join(GPUS))

@@ -1,22 +1,22 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Estimates the time of one training iteration on a GPU from what its compiler says of the passes.
+"""Estimates the time of one training iteration on a GPU from what its compiler reports about the passes.
 
     gpu_model.py PASSES.json [--gpu NAME]     PASSES.json: of `darb devices --passes --json`, or gpu_compilers.py run
     gpu_model.py --gpus                       the GPUs that it knows, and their rates
 
-An estimate, not a measurement. Each pass takes the longest of three times: to issue its instructions, to move its bytes,
-and to work off its longest tile by one workgroup. To these come a launch for each dispatch and a wait for each barrier.
-Bytes, dispatches and barriers are those of the command; instructions are the compiler's. A pass with loops over splats
-counts the instructions of its loop, for one splat and the pixels of a subgroup, from LOOPS.
+This is an estimate, not a measurement. Each pass takes the longest of three times: to issue its instructions, to move its
+bytes, and to process its longest tile by one workgroup. A launch for each dispatch and a wait for each barrier are added.
+Bytes, dispatches and barriers are those of the command; instructions are the compiler's. For a pass with loops over
+splats, LOOPS has the instructions of its loop for one splat and the pixels of a subgroup.
 """
 
 import argparse
 import json
 import sys
 
-# cores; instructions of one subgroup that a core issues in a cycle, for subgroups of `lanes`; GHz; GB/s of memory.
-# From the vendors' published figures. An instruction that waits for the one before takes WAIT cycles.
+# cores; instructions of one subgroup that a core issues per cycle, for subgroups of `lanes`; GHz; GB/s of memory. The
+# figures are the vendors' published ones. An instruction that waits for the one before takes WAIT cycles.
 GPUS = {
     "rtx4090": ("RTX 4090", 128, 4, 32, 2.52, 1008),
     "h200": ("H200", 132, 4, 32, 1.98, 4800),
@@ -27,17 +27,17 @@ GPUS = {
 }
 WAIT = 4.5                       # cycles
 LAUNCH_US, BARRIER_US = 1.5, 2.5
-REACHED_BYTES = 0.7              # of the memory's rate, by scattered accesses of 16 bytes and more
+REACHED_BYTES = 0.7  # share of the memory's rate that scattered accesses of 16 bytes and more reach
 TILE_PIXELS, TOUCHED = 256, 0.6  # share of a tile's blocks that a splat touches
-WALKED = 0.7                     # of these, before all of a block's pixels are opaque
-LONGEST = 4                      # the longest list over the mean one
+WALKED = 0.7  # share of these before all of a block's pixels are opaque
+LONGEST = 4  # the longest list relative to the mean one
 
 # Shader -> instructions of the inner loop for one splat and 64 pixels: (Ada, RDNA 3), read off the listings of Mesa's
 # compilers. The team's 240 are 214 of its loop and 26 of what it does for a chunk, if a splat touches TOUCHED of the
 # blocks; its 107 are in proportion. "version_0.1" reduced each sum over the whole subgroup.
 LOOPS = {"blend": (98, 42), "version_0.1": (364, 161), "blend_backward": (224, 100), "blend_backward_team": (240, 107)}
-ZEROED_BYTES = 36  # of an intersection, before a backward blend that adds to its slots
-# Pass of an iteration -> its shader and what it has a thread for.
+ZEROED_BYTES = 36  # per intersection, before a backward blend that adds to its slots
+# Pass of an iteration -> its shader, and what each of its threads handles.
 THREADS = {"project": ("project", "splats"), "emit": ("emit", "splats"), "project backward": ("project_backward", "splats"),
            "loss": ("loss", "strips")}
 LOSS_ROWS = 3 * 1.6 / 2  # channels, rows and columns computed twice, columns of a thread
@@ -45,7 +45,7 @@ SUBGROUP_SERIAL = {"version_0.1": 4, "blend_backward": 4, "blend_backward_team":
 
 
 def instructions(report, shader):
-    """Of the form with the most harmonics, as the pass stands in the report; None where the driver does not say."""
+    """Instructions of the form with the most harmonics, as the report has the pass; None where the driver does not tell."""
     rows = [row["instructions"] for row in report["passes"] if row["shader"] == shader and "instructions" in row]
     return max(rows) if rows else None
 
@@ -80,7 +80,7 @@ def pass_time(report, work, row, gpu, backward):
 
 
 def estimate(report, gpu, backward):
-    """Rows (pass, ms, what limits it), and at their end what launches and barriers take."""
+    """Rows (pass, ms, what limits it), followed by what launches and barriers take."""
     work = report["iteration"]
     rows = [(row["pass"], *pass_time(report, work, row, gpu, backward)) for row in work["passes"]]
     waits = sum(row["dispatches"] * LAUNCH_US + row["barriers"] * BARRIER_US for row in work["passes"]) / 1e3
@@ -88,7 +88,7 @@ def estimate(report, gpu, backward):
 
 
 def chosen(report):
-    """The backward blend that the device begins with."""
+    """The backward blend with which the device begins."""
     shaders = {row["shader"] for row in report["passes"]}
     return "blend_backward_team" if "blend_backward_team" in shaders and "llvmpipe" not in report["driver"] else "blend_backward"
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The page of tools/gpu_report.sh: gpu_report_page.py FOLDER [PHOTOS] writes FOLDER/index.html from what the steps left.
 
-Takes paths of this machine out of the steps' texts. Text from files is escaped.
+Paths of this machine are removed from the steps' texts, and text from files is escaped.
 """
 
 import html
@@ -36,7 +36,7 @@ def steps_table(folder):
 
 
 def clean(folder, photos):
-    """Folders of the machine become names."""
+    """Replaces folders of the machine by names."""
     for path in (*folder.glob("*.txt"), *folder.glob("*.json")):
         text = read(path)
         for place, name in ((str(folder), "REPORT"), (photos, "PHOTOS"), (str(ROOT), "DARB"), (os.path.expanduser("~"), "HOME")):
@@ -46,7 +46,7 @@ def clean(folder, photos):
 
 
 def measured_passes(folder):
-    """Pass -> (ms, counts) of the case that the model estimates, else of the largest frame."""
+    """Pass -> (ms, counts) for the case that the model estimates, or for the largest frame."""
     files = [folder / name for name in ("filled.json", "bench.json") if (folder / name).exists()]
     cases = [case for file in files for case in json.loads(read(file))["benchmarks"]
              if case.get("passes") and case["name"].startswith(("train/filled", "render/"))]
@@ -57,7 +57,7 @@ def measured_passes(folder):
 
 
 def predicted_and_measured(folder):
-    """The model with the counts of the measured case, for the GPUs that the model knows, beside what was measured."""
+    """The model with the counts of the measured case, for the GPUs that it knows, beside what was measured."""
     ms, case = measured_passes(folder)
     if not case or not (folder / "passes.json").exists():
         return ""

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The guards of the hard cases: which line of the sources holds each, and which test watches it.
+"""The guards of the hard cases: which line of the sources each one is, and which test watches it.
 
     tools/lab/guards.py check               strings and tests exist, docs/hard_cases.md says the same
     tools/lab/guards.py docs                rewrites its table, and those of docs/experiments/float32.md from
@@ -32,7 +32,7 @@ BLEND_BACK = "shaders/backward/area_walk.glsl"
 SPLAT_SUMS = "shaders/backward/splat_sums.glsl"
 BACK = "shaders/backward/project_backward.comp"
 
-# case, guard, file, text that holds it, what stands there without it, test program, test (gtest filter)
+# case, guard, file, the guarding text, its replacement without the guard, test program, test (gtest filter)
 GUARDS = [
     ("splat behind or on the near plane", "near_plane", PROJECT,
      " || !(p.z > camera.near_plane)", "",
@@ -229,7 +229,7 @@ def test_sources():
 
 
 def executable_of(program):
-    """That holds a test file, as tests/CMakeLists.txt puts it."""
+    """The test program that holds a test file, as tests/CMakeLists.txt defines it."""
     [folder] = [at for at, _, names in os.walk(os.path.join(ROOT, "tests")) if program + ".cpp" in names]
     kind = os.path.relpath(folder, os.path.join(ROOT, "tests"))
     if kind.startswith("unit/"):
@@ -249,7 +249,7 @@ def case_table():
 
 
 def between(text, name, new=None):
-    """The text between the markers of a table, or the whole with it replaced."""
+    """The text between a table's markers, or the whole page with that text replaced."""
     begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->"
     first, last = text.index(begin) + len(begin), text.index(end)
     return text[first:last].strip() if new is None else text[:first] + new + "\n" + text[last:]
@@ -302,7 +302,7 @@ def shell(command, **more):
 
 
 def is_red(result, test):
-    """A crash counts; no test run at all does not."""
+    """A crash counts as red; no test run at all does not."""
     if "[==========] Running 0 tests" in result.stdout:
         sys.exit(f"no test matches {test}")
     return result.returncode != 0
@@ -318,7 +318,7 @@ def run(names):
             os.makedirs(os.path.dirname(old), exist_ok=True)
             shutil.copyfile(new, old)
     build = os.path.join(copy, "build")
-    # So that ccache, where there is one, knows the objects of the project's own build.
+    # With this, ccache, where there is one, finds the objects of the project's own build.
     os.environ.update(CCACHE_BASEDIR=copy, CCACHE_NOHASHDIR="1")
     made = shell(["cmake", "-G", "Ninja", "-S", copy, "-B", build, "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_UNITY_BUILD=ON",
                   "-DDARB_WERROR=OFF"])

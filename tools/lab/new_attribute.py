@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""What the next attribute of splats takes: adds one, `glow`, a float that is added to all three channels of the colour,
-to a copy of the sources. It is trained, kept by density control, saved, resumed and compared with the reference in double.
+"""What the next attribute of splats takes. It adds one, `glow`, a float that is added to all three channels of the colour, to
+a copy of the sources. There it is trained, kept by density control, saved, resumed and compared with the reference in double.
 
-    tools/lab/new_attribute.py --check      whether the changes fit the sources, and that they are in no more than 8 files
+    tools/lab/new_attribute.py --check      whether the changes fit the sources and touch no more than 8 files
     tools/lab/new_attribute.py              builds the copy (build-attribute), runs `darb check` with it, trains the shipped
-                                        scene, and wants the attribute's gradients right, its column in the PLY changed by
-                                        training, and a resumed run bit-equal; minutes
+                                        scene, and checks that the attribute's gradients are right, that training changed
+                                        its column in the PLY, and that a resumed run is bit-equal; takes minutes
 """
 
 import os
@@ -19,7 +19,7 @@ from changed_copy import ROOT, built_copy, changed_texts
 
 MOST_FILES = 8
 
-# file, text, with the attribute
+# file, old text, text with the attribute
 CHANGES = [
     ("shaders/shared/attribute_list.h", "#define ATTRIBUTES 7", "#define ATTRIBUTE_GLOW 7\n#define ATTRIBUTES 8"),
     ("engine/scene/splat_model.h", "    kShape = ATTRIBUTE_SHAPE,\n",
@@ -52,7 +52,7 @@ CHANGES = [
 
 
 def column(ply, name):
-    """Of a binary PLY of floats."""
+    """Reads a binary PLY of floats."""
     head, _, body = ply.partition(b"end_header\n")
     names = [line.split()[2].decode() for line in head.splitlines() if line.startswith(b"property ")]
     count = next(int(line.split()[2]) for line in head.splitlines() if line.startswith(b"element vertex "))

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """What it costs that training repeats bit by bit: gradients of a splat-tile intersection have a slot of their own and are
-summed in order. Builds, in a copy of the sources (build-atomics), the other way: float atomics into one sum a splat;
+summed in order. In a copy of the sources (build-atomics) this builds the other way, float atomics into one sum per splat,
 trains both in turn on the shipped scene, and prints the milliseconds of the two passes that differ.
 
     tools/lab/price_of_determinism.py [OUT.json] [ROUNDS]      default 5 rounds of 300 iterations, median of the rounds
@@ -19,7 +19,7 @@ from changed_copy import ROOT, built_copy, changed_texts
 
 PASSES = ("blend backward", "project backward")
 
-# file, text, with atomics
+# file, old text, text with atomics
 CHANGES = [
     ("shaders/lib/partials.glsl", "partials0[at] PARTIALS_PUT value;", "atomicAdd(partials0[at], value);"),
     ("shaders/backward/blend_backward_team.comp", "#extension GL_KHR_shader_subgroup_arithmetic : require",

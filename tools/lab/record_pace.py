@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The pace of training runs as the test of the time left wants it, from their output folders.
+"""Records the pace of training runs, from their output folders, for the test of the time left.
 
   tools/lab/record_pace.py OUT NAME...    writes tests/unit/trainer/pace/NAME.json from OUT/NAME/run.jsonl
 
@@ -8,7 +8,7 @@ Run it on runs that darb train made on one device, with a forecast (200 iteratio
 
   for s in adc mcmc budget; do chrt -f 1 darb train assets/scene -o OUT/$s --strategy $s --iterations 1000; done
 
-where chrt keeps other programs of the machine out. A sample is an iteration, the seconds until then, the splats, and the
+where chrt keeps other programs of the machine away. A sample is an iteration, the seconds until then, the splats, and the
 milliseconds of the passes of one of its iterations.
 """
 import json

@@ -1,20 +1,20 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Disturbs the cameras of a COLMAP project, and measures how far others are from its own.
+"""Disturbs the cameras of a COLMAP project, and measures how far other cameras are from the original ones.
 
     refined_cameras.py disturb DATASET OUT PX [--seed N] [--no-tracks]
     refined_cameras.py measure DATASET CAMERAS.json [--trained] [--json FILE]
 
-disturb  writes OUT, a project with the same photos and other poses: each camera is turned and moved at random, half
-         of the shift from either, until the points that it sees are shifted by PX in the mean. The points follow: each
-         is placed anew where the disturbed cameras see it best. --no-tracks leaves out what says where photos saw
-         points, so that pictures alone can tell; the points stay where they are then, with noise of as many pixels.
-measure  the cameras of a run beside those of DATASET: both are aligned by the similarity (turn, move, scale) under
-         which the points are drawn nearest to each other; then the root of the mean square over the points of each
-         camera, in px of the photos as CAMERAS.json has them. Prints median, largest and mean of the cameras. --trained
-         leaves out every 8th, which `darb train --eval` holds out.
+disturb  writes OUT, a project with the same photos and other poses. Each camera is turned and moved at random, with half
+         of the shift from either, until the points that it sees are shifted by PX on average. The points follow: each is
+         placed anew where the disturbed cameras see it best. --no-tracks leaves out where photos saw points, so that only
+         the pictures can tell; the points then stay where they are, with noise of as many pixels.
+measure  compares the cameras of a run with those of DATASET. Both are aligned by the similarity (turn, move, scale) under
+         which the points are drawn nearest to each other. The error of a camera is the root mean square over its points, in
+         px of the photos as CAMERAS.json has them. Prints median, largest and mean over the cameras. --trained leaves out
+         every 8th camera, which `darb train --eval` holds out.
 
-Binary models of pinholes. Nothing outside of Python's own library is needed.
+It takes binary models of pinholes, and needs nothing but Python's standard library.
 """
 
 import argparse
@@ -94,7 +94,7 @@ def solve(a, b):
 
 
 class Camera:
-    """rotation and translation from world to camera, and a pinhole."""
+    """Rotation and translation from world to camera, and a pinhole."""
 
     def __init__(self, rotation, translation, fx, fy, cx, cy, width):
         self.rotation, self.translation = rotation, translation
@@ -163,7 +163,7 @@ class Model:
             for image, _ in point["track"]:
                 if image in seen:
                     seen[image].append(point["at"])
-        if not any(seen.values()):  # none says: what lies in the frame
+        if not any(seen.values()):  # no photo names its points, so those within the frame count
             for number, image in self.images.items():
                 for point in self.points.values():
                     at = image["camera"].pixel(point["at"])
@@ -191,7 +191,7 @@ class Model:
 
 
 def shift(a, b, points):
-    """Root of the mean square of what lies between two cameras' pixels of the points."""
+    """The root mean square distance between two cameras' pixels of the points."""
     squares = []
     for x in points:
         p, q = a.pixel(x), b.pixel(x)
@@ -217,7 +217,7 @@ def disturbed(camera, points, px, rng):
     depth = statistics.median(camera.place(x)[2] for x in points)
     by_move = mean_shift(camera, camera.moved([0, 0, 0], [one * depth * x for x in move]), points) / one
     size = 1.0
-    for _ in range(20):  # what both do together is not the sum
+    for _ in range(20):  # turning and moving together is not the sum of both
         t = [size * px * x / by_turn for x in turn]
         m = [size * px * depth * x / by_move for x in move]
         size *= px / mean_shift(camera, camera.moved(t, m), points)
@@ -225,7 +225,7 @@ def disturbed(camera, points, px, rng):
 
 
 def triangulated(at, seen):
-    """seen: [(camera, pixel)]. Gauss and Newton, damped; where it began, if that helps nothing."""
+    """seen: [(camera, pixel)]. Damped Gauss-Newton; returns the start where it does not help."""
     def cost(x):
         sum_ = 0.0
         for camera, pixel in seen:
@@ -288,9 +288,9 @@ def disturb(args):
 
 
 def similarity_steps(pairs):
-    """Camera of the run -> the same after turn, move, scale of its world: minimised over pixels. pairs: [(true, got,
-    points)]; the points are of the true world."""
-    # x_got = scale turn x + move: first from the centres, then by Gauss and Newton over pixels.
+    """Camera of the run -> the same camera after a similarity of its world that minimises the distance in pixels. pairs: [(true,
+    got, points)]; the points are those of the true world."""
+    # x_got = scale turn x + move, at first from the centres, then by Gauss-Newton over pixels.
     def centre(c):
         return [-v for v in apply(transpose(c.rotation), c.translation)]
     turn, move, scale = [[float(i == j) for j in range(3)] for i in range(3)], [0.0] * 3, 1.0
@@ -350,7 +350,7 @@ def aligned_shifts(model, listed):
     turn, move, scale = similarity_steps(pairs)
     shifts = []
     for true, got, points in pairs:
-        # got sees x_got = scale turn x + move; as a camera of the true world, up to scale.
+        # `got` sees x_got = scale turn x + move; this makes it a camera of the true world, up to scale.
         rotation = matmul(got.rotation, turn)
         translation = [v / scale for v in add(apply(got.rotation, move), got.translation)]
         same = Camera(rotation, translation, got.fx, got.fy, got.cx, got.cy, got.width)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""How the laboratory writes its results: JSON with a row a line, so that a file is short and a change of it is read."""
+"""How the laboratory writes its results: JSON with one row per line, so that a file is short and its changes are readable."""
 
 import json
 import textwrap
 
-LONGEST = 240  # characters of what stands on one line
+LONGEST = 240  # most characters of a value that goes on one line
 
 
 def text(value, indent=0):
-    """The value as JSON: on one line where that is short, else a line for each of its members."""
+    """The value as JSON: on one line where that is short, otherwise one line for each member."""
     line = json.dumps(value)
     if len(line) <= LONGEST or not isinstance(value, (dict, list)):
         return line

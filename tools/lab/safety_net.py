@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Hashes of what short training runs, pictures and converted files leave: a change that only moves code keeps them all.
+"""Hashes of what short training runs, pictures and converted files produce. A change that only moves code keeps them all.
 
     safety_net.py record FILE [--darb PATH] [--quick] [--only TEXT]
     safety_net.py compare FILE [--darb PATH] [--quick] [--only TEXT]
@@ -28,10 +28,11 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "assets" / "scene"
 TRAIN = ["--eval", "--no-report", "-q"]
-USUAL = {"-r": "100", "--tune": "backward=subgroup"}  # of a run that does not say otherwise
+USUAL = {"-r": "100", "--tune": "backward=subgroup"}  # options of a run that does not say otherwise
 KERNELS = ["gaussian", "raised_cosine", "half_cosine_squared", "sinc", "inverse_quadratic"]
 
-# name: options; each leaves a PLY and the held-out pictures. A checkpoint holds seconds: resumed runs show what it keeps.
+# name: options. Each leaves a PLY and the held-out pictures. A checkpoint holds seconds, so resumed runs show what it
+# keeps.
 RUNS = {f"{kernel}_{footprint}": ["--kernel", kernel, "--footprint", footprint, "--iterations", "160"]
         for kernel in KERNELS for footprint in ("psi", "exact")}
 RUNS |= {
@@ -53,7 +54,7 @@ RUNS |= {
 }
 RESUMED = {"resumed": ("gaussian_psi", "80"), "resumed_mcmc": ("mcmc", "100"), "resumed_budget": ("budget", "150")}
 
-# name: (the run whose scene it draws, options); each leaves three pictures.
+# name: (the run whose scene it draws, options). Each leaves three pictures.
 PICTURES = {f"draw_{run}": (run, []) for run in RUNS if run != "buckets"}
 PICTURES |= {f"draw_accuracy_{choice}": ("gaussian_psi", ["--accuracy", choice]) for choice in ("fast", "exact")}
 PICTURES |= {
@@ -139,7 +140,7 @@ class Net:
 
 
 def stages(net, quick, only):
-    """The cases to run, a stage needing those before it: [(function, names)]."""
+    """The cases to run, as stages that need those before them: [(function, names)]."""
     wanted = lambda name, source: (source in QUICK or not quick) and (only in name or only in source)
     runs = [n for n in RUNS if (n in QUICK or not quick) and only in n]
     resumed = [n for n in RESUMED if (n in QUICK or not quick) and only in n]
@@ -174,7 +175,7 @@ def measure(darb, quick, only):
 
 
 def compare(before, after):
-    """Prints what differs; returns the number of cases that do."""
+    """Prints what differs and returns the number of cases that do."""
     differing = 0
     for name in sorted(after):
         if name not in before:

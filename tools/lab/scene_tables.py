@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Keeps what `darb compare` found on data sets in assets/results/scenes_lavapipe.json and writes its tables into
+"""Keeps the results of `darb compare` on data sets in assets/results/scenes_lavapipe.json and writes their tables into
 docs/experiments/kernels_on_photos.md.
 
     tools/lab/scene_tables.py TITLE=COMPARE.json...     takes these comparisons, one table each; others stay
@@ -74,7 +74,7 @@ def table(title, figures):
 
 
 def blending_table(title, figures):
-    """Of each kernel's first run: a column a data set; nothing where none was measured."""
+    """The first run of each kernel, with a column for each data set; nothing where none was measured."""
     rows = [r for r in figures["median_low_high"] if "blended_per_pixel" in r]
     sets, kernels = (list(dict.fromkeys(r[key] for r in rows)) for key in ("dataset", "kernel"))
     lines = [f"**{title}**", "", "| blended per pixel, intersections per splat, ms | " + " | ".join(sets) + " |",
@@ -87,7 +87,7 @@ def blending_table(title, figures):
 
 
 def replaced(page, name, tables):
-    """The page with these tables between its marks of this name."""
+    """The page with these tables between its markers of this name."""
     begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
     if begin not in page or end not in page:
         sys.exit(f"{PAGE}: has no {begin.strip()} before {end}; put both back")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Tables of what accuracy costs on some scenes (docs/experiments/accuracy_cost.md) and of what effects each data set calls
-for (docs/experiments/effect_costs.md).
+"""Tables of what accuracy costs on some scenes (docs/experiments/accuracy_cost.md), and of which effects each data set needs
+(docs/experiments/effect_costs.md).
 
     tools/lab/show_costs.py --darb build/darb --scene NAME=SCENE[,DATASET] ... [--quick]
         runs `darb cost` on each scene; writes OUT/accuracy_cost.json
@@ -10,8 +10,8 @@ for (docs/experiments/effect_costs.md).
         --compare; writes OUT/effect_plans.json
 
 --out OUT: default assets/results. --prefix "chrt -r 4": put before each measuring command. --note TEXT: about the
-machine, kept in the files. Results of scenes that are not named this time are kept. Every call, one without scenes
-too, rewrites the tables of both pages.
+machine, kept in the files. Results of scenes that are not named this time are kept. Every call, even one without scenes,
+rewrites the tables of both pages.
 """
 
 import argparse
@@ -92,7 +92,7 @@ def cost_cell(row):
 
 
 def answer_table(answers):
-    """The sentences of `darb cost` on what is fastest under a condition, a row each."""
+    """The sentences of `darb cost` about what is fastest under a condition, one row each."""
     form = re.compile(r"Fastest (?:with|within|at) (.*): (.*), ([\d.]+) ms a frame, ([\d.]+) times as fast as balanced, "
                       r"([\d.]+ dB) from the truth(?:, ([\d.]+ dB) against the photos)?\.")
     rows = []
@@ -107,7 +107,7 @@ def answer_table(answers):
 
 
 def cost_tables(costs):
-    """Settings alone and presets, a column a scene; then the answers and the front of each."""
+    """Single settings and presets with a column for each scene, then the answers and the front of each."""
     single = [s for s in SETTINGS_FIRST if any(s == r["name"] for scene in costs.values() for r in scene["rows"])]
     single += [r["name"] for scene in costs.values() for r in scene["rows"]
                if re.fullmatch(r"[a-z_]+ \S+", r["name"]) and r["name"] not in single]

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Writes the tables of docs/speed.md from results of `darb bench`: every case with its most expensive passes and their shares of
-the roofline, and, where there is one of `darb bench --growth`, time against splats, pixels and intersections.
+"""Writes the tables of docs/speed.md from results of `darb bench`: every case with its most expensive passes and their
+shares of the roofline and, where there is a result of `darb bench --growth`, time against splats, pixels and intersections.
 
     tools/lab/speed_page.py          from assets/results/bench_lavapipe.json and growth_lavapipe.json
 """
@@ -14,7 +14,7 @@ import sys
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 RESULTS = os.path.join(ROOT, "assets/results")
 PAGE = os.path.join(ROOT, "docs/speed.md")
-SHOWN = 4  # passes of a case
+SHOWN = 4  # passes shown for each case
 
 
 def ms(value):

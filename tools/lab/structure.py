@@ -4,12 +4,12 @@
 
     structure.py [--json] [ROOT]
 
-Sizes are read with Universal Ctags (Debian: universal-ctags). The files of a change are those that name the last thing
-of its kind that was added, tests, documents and comments left out: whoever adds the next one edits as many. An attribute
-is measured by adding one: tools/lab/new_attribute.py; where that is not there, by the files that name one. A second process
-that trains along edits the users of the gradients' buffers and none of what makes them, so the room that holds those
-(engine/raster) does not count. The files that a format has of its own, reader, writer and layout, count as one.
-A number with a target is marked where it misses it.
+Sizes are read with Universal Ctags (Debian: universal-ctags). The files of a change are those that name the last thing of
+its kind that was added, without tests, documents and comments: whoever adds the next one edits as many. An attribute is
+measured by adding one (tools/lab/new_attribute.py), or where that script is missing, by the files that name one. A second
+process that trains along edits the users of the gradients' buffers but nothing that makes them, so the room that holds
+those (engine/raster) does not count. The files of a format's own, reader, writer and layout, count as one. A number with
+a target is marked where it misses it.
 """
 
 import argparse
@@ -54,7 +54,7 @@ def tags(root, files):
 
 
 def parameters(signature):
-    """Of a signature, commas within brackets left out."""
+    """Counts the parameters of a signature, without commas inside brackets."""
     inner = re.sub(r"\([^()]*\)|<[^<>]*>|\{[^{}]*\}", "", re.sub(r"<[^<>]*>", "", signature.strip()[1:-1]))
     return 0 if inner.strip() in ("", "void") else inner.count(",") + 1
 
@@ -100,7 +100,7 @@ def changes(root, files):
 
 
 def same_names(files):
-    """Of headers, and of sources, in different folders; a program's main.cpp apart."""
+    """Names of headers and sources that occur in several folders, except a program's main.cpp."""
     folders = {}
     for name in files:
         path = pathlib.Path(name)
@@ -125,7 +125,7 @@ def upward_arrows(root):
 
 
 def targets(root, files):
-    """What the shape of the tree should come to: (what, how it is now, most that it should be)."""
+    """The targets for the shape of the tree: (what, current value, target)."""
     lines = {name: len(pathlib.Path(root, name).read_text(errors="replace").splitlines()) for name in files}
     code = [name for name in files if name.endswith((".cpp", ".h", ".comp", ".glsl"))]
     cpp = [name for name in code if name.endswith((".cpp", ".h")) and not name.startswith("shaders/")]

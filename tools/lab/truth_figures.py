@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Figures of how far the numbers can be trusted: collected from what the checks print, shown in docs/experiments/float32.md.
+"""Figures on how far the numbers can be trusted, collected from the output of the checks and shown in docs/experiments/float32.md.
 
     tools/lab/truth_figures.py WHAT=FILE...     takes new figures into assets/results/truth_lavapipe.json and leaves the
                                             others as they are; `tools/lab/guards.py docs` then shows them
@@ -130,7 +130,7 @@ def walk_errors(check_figures):
 
 
 def run_table(figures):
-    """What was run, a line each; what never ran has none."""
+    """What was run, a line each; checks that never ran have none."""
     lines = ["| what | found |", "|---|---|"]
 
     def line(what, name, text):

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Lets a shared library ask an older glibc for dlopen and its kin: their version GLIBC_2.34 becomes GLIBC_2.2.5.
+"""Lets a shared library ask an older glibc for dlopen and related functions: their version GLIBC_2.34 becomes GLIBC_2.2.5.
 
   tools/portable/lower_versions.py LIBRARY    rewrites the file; refuses where another symbol needs 2.32 or later
 
-For the Vulkan loader of the portable archive, which Debian has as a shared library alone.
+It is for the Vulkan loader of the portable archive, which Debian has only as a shared library.
 """
 import re
 import struct

@@ -27,7 +27,7 @@ py::object numpy() {
     return py::module_::import("numpy");
 }
 
-// What a library says of its own array becomes the reason.
+// The error of a library about its own array becomes the reason.
 template <class Convert>
 py::array converted(const char* name, const Convert& convert) {
     try {
@@ -80,7 +80,7 @@ bool block_is_within(const float* values, float least, float most) {
     return inside != 0;
 }
 
-// The exponent of what is infinite or no number is all ones, and one more reaches the sign.
+// The exponent of infinity and NaN is all ones, and one more reaches the sign.
 bool block_is_finite(const float* values) {
     constexpr std::uint32_t kExponent = 0x7f800000, kOne = 0x00800000, kSign = 0x80000000;
     std::uint32_t all = 0;
@@ -208,7 +208,7 @@ void check_values(const Floats& values, const char* name, float least, float mos
 
 py::object take_whole_number(const py::object& value, const char* name) {
     if (PyBool_Check(value.ptr()) == 0 && PyIndex_Check(value.ptr()) != 0) {
-        // Arrays of several numbers have an __index__, too, and fail in it.
+        // Arrays of several numbers have an __index__, too, but it fails.
         if (auto number = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr())))
             return number;
         PyErr_Clear();
@@ -265,7 +265,7 @@ std::string take_path(const py::object& value, const char* name) {
     if (!py::isinstance<py::str>(value) && !py::hasattr(value, "__fspath__"))
         throw Error(name, type_text(value) + ", no path", "Give a str or a pathlib.Path.");
     const py::object text = py::module_::import("os").attr("fsdecode")(value);
-    // Names that are no UTF-8 come back as the bytes that they are.
+    // Names that are not UTF-8 come back as the bytes that they are.
     const std::string path = py::bytes(py::module_::import("os").attr("fsencode")(text));
     if (path.empty() || path.find('\0') != std::string::npos)
         throw Error(name, "is no path: empty, or with a zero in it", "Name a file.");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What Python gives a function, taken with care: each wrong type, shape, order, device and number
-// is an Error that names the argument and says what it takes. Arrays are views: the floats stay
-// where they are, and are read while the holder lives.
+// Checks what Python passes to a function: each wrong type, shape, order, device or number becomes
+// an Error that names the argument and says what it takes. Arrays are views: the floats stay where
+// they are and are read while the holder lives.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -20,9 +20,9 @@ namespace darb::python {
 
 namespace py = pybind11;
 
-constexpr py::ssize_t kAny = -1;  // a length that is free
+constexpr py::ssize_t kAny = -1;  // a length that may be anything
 
-/// float32 in C order, aligned, in memory of the host.
+/// float32 in C order, aligned, in host memory.
 struct Floats {
     py::array holder;
     const float* data = nullptr;
@@ -35,22 +35,24 @@ struct Floats {
     std::vector<float> copy() const { return {data, data + size()}; }
 };
 
-/// Any array: of numpy, or what has DLPack or the buffer protocol, on the host.
+/// Takes any array on the host: numpy's, or one that supports DLPack or the buffer protocol.
 py::array take_array(const py::object& value, const char* name);
-/// shape: lengths, kAny for any. A numpy array, or what has DLPack or the buffer protocol.
+/// shape: lengths, with kAny for any. Takes numpy arrays, and those that support DLPack or the
+/// buffer protocol.
 Floats take_floats(const py::object& value, const char* name,
                    std::initializer_list<py::ssize_t> shape);
-/// The same in float64, of float32 or float64: small arrays, of cameras.
+/// Does the same in float64, from float32 or float64, for small arrays such as cameras.
 std::vector<double> take_doubles(const py::object& value, const char* name,
                                  std::initializer_list<py::ssize_t> shape,
                                  std::vector<py::ssize_t>* lengths = nullptr);
-/// Whether none is NaN, infinite, below least or above most. Needs no GIL.
+/// Whether no value is NaN, infinite, below least or above most. Does not need the GIL.
 bool are_within(std::span<const float> values, float least, float most);
-/// Throws Error with the place of the first that is NaN or infinite, below least or above most.
+/// Throws an Error with the place of the first value that is NaN, infinite, below least or above
+/// most.
 void check_values(const Floats& values, const char* name, float least, float most,
                   const char* hint);
 
-/// An int: of numpy's integers, too.
+/// An int, or one of numpy's integers.
 py::object take_whole_number(const py::object& value, const char* name);
 long long take_integer(const py::object& value, const char* name, long long least, long long most);
 double take_number(const py::object& value, const char* name, double least, double most);
@@ -60,13 +62,13 @@ std::string take_text(const py::object& value, const char* name);
 std::string take_path(const py::object& value, const char* name);
 py::object take_callable(const py::object& value, const char* name);
 
-/// "(10, 4)".
+/// For example "(10, 4)".
 std::string shape_text(const std::vector<py::ssize_t>& shape);
-/// "is a list": for messages.
+/// For messages, for example "is a list".
 std::string type_text(const py::object& value);
 
-/// Calls the handlers of Python's signals, as Ctrl-C has one: throws what they raise. With the GIL
-/// or without.
+/// Calls the handlers of Python's signals, such as that of Ctrl-C, and throws what they raise.
+/// Works with or without the GIL.
 void check_signals();
 
 /// A new array with a copy of the values.
@@ -79,7 +81,7 @@ py::array_t<T> to_array(const std::vector<T>& values, std::vector<py::ssize_t> s
     return array;
 }
 
-/// The same without a copy: the array owns the values.
+/// Does the same without a copy: the array owns the values.
 template <class T>
 py::array_t<T> into_array(std::vector<T> values, std::vector<py::ssize_t> shape) {
     auto owned = std::make_unique<std::vector<T>>(std::move(values));

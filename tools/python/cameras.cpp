@@ -9,7 +9,7 @@ namespace darb::python {
 
 namespace {
 
-constexpr double kRigid = 1e-3;  // how far R R^T may be from 1, as products of float32 drift
+constexpr double kRigid = 1e-3;  // how far R R^T may be from 1, because products of float32 drift
 
 Camera camera_of(const double* m, const double* k, std::size_t index) {
     Camera camera;

@@ -17,7 +17,7 @@ const View& view_at(const PyDataset& set, const py::object& index) {
     return set.data.views[static_cast<std::size_t>(i)];
 }
 
-// One array of all views: [V, rows, columns] of what one makes of a camera.
+// One array for all views: [V, rows, columns] of what `one` makes from a camera.
 template <class One>
 py::object stacked(const PyDataset& set, const One& one) {
     py::list all;

@@ -11,7 +11,7 @@ struct PyDataset {
     Dataset data;
 };
 
-/// options: resolution, eval, images, lens; as `darb train` has them.
+/// options: resolution, eval, images, lens, as for `darb train`.
 PyDataset read_dataset(const py::object& path, const py::dict& options);
 
 void bind_dataset(py::module_& module);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A device as Python holds it: one lock, under which a single call uses its queue, and the
-// renderers that calls with arrays make, kept for the next call of the same kind.
+// A device as Python holds it. It has one lock, under which a single call uses its queue, and it
+// keeps the renderers that calls with arrays make for the next call of the same kind.
 #pragma once
 
 #include <sys/types.h>
@@ -35,15 +35,15 @@ struct KeptRenderer {
     std::uint64_t picture = 0;  // number of the picture that it drew last; 0: none
 };
 
-/// The renderers of one owner, the latest used first; at most a few.
+/// The renderers of one owner, the latest used first; there are only a few.
 class Renderers {
   public:
-    /// nullptr where there is none of this kind.
+    /// nullptr where there is no such renderer.
     KeptRenderer* find(const RendererKey& key);
-    /// A new one, which begins with the model.
+    /// Makes a new renderer, which begins with the model.
     KeptRenderer& make(Device& device, const RendererKey& key, const SplatModel& model);
     void clear() { kept_.clear(); }
-    /// Leaves the renderers behind, in a child process.
+    /// Abandons the renderers without freeing them, in a child process.
     void leak() { static_cast<void>(new std::list<KeptRenderer>(std::move(kept_))); }
 
   private:
@@ -58,12 +58,13 @@ class PyDevice {
     PyDevice(const PyDevice&) = delete;
     PyDevice& operator=(const PyDevice&) = delete;
 
-    /// The lock, to be held while the device is used; the GIL must not be. Waits with an ear for
-    /// signals. Throws Error in a child process, where the device is not.
+    /// Takes the lock, which must be held while the device is used, without holding the GIL. It
+    /// listens to signals while it waits. Throws Error in a child process, which does not have the
+    /// device.
     std::unique_lock<std::recursive_timed_mutex> lock();
 
-    /// For destructors: free_it under the lock, whatever signals say; in a child process, where
-    /// nothing of the device may be touched, leave_it. The GIL must not be held. Never throws.
+    /// For destructors: calls free_it under the lock, whatever signals say, or leave_it in a child
+    /// process, which may not touch the device. The GIL must not be held. Never throws.
     void let_go(const std::function<void()>& free_it,
                 const std::function<void()>& leave_it) noexcept;
 
@@ -71,7 +72,7 @@ class PyDevice {
     const DeviceInfo& info() const { return device_->info(); }
     Renderers& renderers() { return renderers_; }
     std::uint64_t next_picture() { return ++pictures_; }
-    /// Whether a trainer's step is under way, from whose callback nothing may train.
+    /// Whether a trainer's step is under way; its callback must not train.
     bool training = false;
 
   private:

@@ -15,14 +15,14 @@ namespace darb::python {
 
 namespace {
 
-// A row of the registry, which lives as long as the process: a name of it.
+// The name of a row of the registry, which lives as long as the process.
 struct PyKernel {
     int id = 0;
 
     const KernelDefinition& definition() const { return *kernel_definition(id); }
 };
 
-// Kernels with shapes are no rows of the list.
+// Kernels with shapes are not rows of the list.
 std::vector<int> named_kernels() {
     std::vector<int> kernels = known_kernels();
     const std::vector<int> shaped = shaped_kernels();
@@ -37,7 +37,7 @@ std::string names() {
     return text;
 }
 
-// w(q) as Python computes it; what it raises comes out.
+// w(q) as a Python function computes it; its exceptions are passed on.
 KernelDefinition defined(const py::object& profile, double support, const std::string& name) {
     if (py::isinstance<py::str>(profile))
         return kernel_from_expression(take_text(profile, "profile"), support, name, "darb.Kernel");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Kernels and footprints by name, or as an object.
+// Kernels and footprints, given by name or as an object.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@ namespace darb::python {
 
 /// The kernel of a darb.Kernel; nothing for anything else.
 std::optional<int> kernel_of_object(const py::object& value);
-/// A row of engine/kernels, by its name or from a darb.Kernel.
+/// A row of engine/kernels, given by name or as a darb.Kernel.
 int take_kernel(const py::object& value, const char* name);
 Footprint take_footprint(const py::object& value);
 

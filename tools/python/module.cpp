@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// _darb: what the package darb (tools/python/darb) is made of. Functions take their arguments in a
-// dict where Python's side has names and defaults for them; every mistake is darb.Error.
+// _darb: the module that the package darb (tools/python/darb) is built on. Functions take their
+// arguments in a dict where the Python side has names and defaults for them; every mistake is a
+// darb.Error.
 #include <pybind11/pybind11.h>
 
 #include "engine/data/image_io.h"
@@ -18,13 +19,13 @@ namespace darb::python {
 
 namespace {
 
-// A kind of darb.Error that scripts also find under a name of Python's own.
+// A kind of darb.Error that scripts can also catch as one of Python's own exceptions.
 PyObject* kind_of(PyObject* error, const char* name, const char* doc, PyObject* pythons) {
     const py::tuple bases = py::make_tuple(py::handle(error), py::handle(pythons));
     return PyErr_NewExceptionWithDoc(name, doc, bases.ptr(), nullptr);
 }
 
-// An Error of the engine as the exception of Python, with its parts.
+// Turns an Error of the engine into the Python exception, with its parts.
 void translate_errors(py::module_& module) {
     static PyObject* type = PyErr_NewExceptionWithDoc(
         "darb.Error",
@@ -104,7 +105,8 @@ void bind_pictures(py::module_& module) {
 
 PYBIND11_MODULE(_darb, module) {
     using namespace darb::python;
-    // A function, as a second interpreter gets a copy of the module and does not come here.
+    // This is a function because a second interpreter gets a copy of the module and does not come
+    // here.
     module.def("check_interpreter", [] {
         if (PyInterpreterState_Get() != PyInterpreterState_Main())
             throw py::import_error(

@@ -41,7 +41,7 @@ RendererKey key_of(const SplatModel& header, const Pictures& pictures,
     return key;
 }
 
-// Copies from where the arrays lie into the buffers of an earlier call, if that had as many splats.
+// Copies the caller's arrays into the buffers of an earlier call, if that had as many splats.
 void put(KeptRenderer& kept, const SplatArraysGiven& given) {
     GradientRenderer& renderer = kept.renderer;
     if (!renderer.holds(given.count(), given.header.sh_degree))
@@ -51,8 +51,8 @@ void put(KeptRenderer& kept, const SplatArraysGiven& given) {
     throw Error("splats", "changed while they were read", "Do not write to them during a call.");
 }
 
-// The renderer with the splats that a call is of, on the device. drawn: the number of a picture of
-// these splats: where it is the last one, the splats are there.
+// The renderer with the splats of a call on the device. drawn: the number of a picture of these
+// splats. If it is the last one drawn, the splats are there already.
 KeptRenderer& ready(PyDevice& device, const RendererKey& key, const SplatArraysGiven* given,
                     PyScene* scene, std::uint64_t drawn = 0) {
     if (scene != nullptr) return scene->renderer(key);
@@ -80,7 +80,7 @@ PyScene* scene_of(const std::shared_ptr<PyDevice>& device, const py::dict& optio
     return scene;
 }
 
-// The images of all cameras one after the other; a single one is not copied.
+// The images of all cameras one after another; a single one is not copied.
 py::array image_array(std::vector<ImageF> images, bool with_channels) {
     const ImageF& first = images.front();
     std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(images.size()), first.height,
@@ -213,7 +213,7 @@ py::dict gradients_dict(const Sums& sums, int kernel, int sh_degree, const Pictu
     return d;
 }
 
-// The cameras one after another: of one picture that is still there, without drawing it again.
+// Handles the cameras one after another. A picture that is still there is not drawn again.
 py::dict rasterize_backward(const std::shared_ptr<PyDevice>& device, const py::dict& options,
                             const py::object& d_image, const py::object& d_alpha,
                             const py::object& picture, const py::object& with_camera) {

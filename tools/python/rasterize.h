@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// darb.rasterize: arrays or a scene to pictures, and back to gradients.
+// darb.rasterize: turns arrays or a scene into pictures, and pictures' gradients back into theirs.
 #pragma once
 
 #include "tools/python/device.h"
 
 namespace darb::python {
 
-/// What is drawn besides the splats, of both ways to give them.
+/// What is drawn besides the splats, for both ways of giving them.
 struct Pictures {
     std::vector<Camera> cameras;
     std::vector<glm::vec3> backgrounds;  // [C]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// darb.reference: the same pictures and gradients in double precision, by the code that is the
-// truth of darb's own tests (engine/reference). Slow, on the host.
+// darb.reference: the same pictures and gradients in double precision, by the code that darb's own
+// tests take as the truth (engine/reference). It runs on the host and is slow.
 #include "tools/python/reference.h"
 
 #include <cmath>
@@ -32,7 +32,7 @@ reference::Splats<double> splats_of(const SplatArraysGiven& given) {
     return splats;
 }
 
-// Turns gradients by logits, logarithms and harmonics into gradients by what was given.
+// Turns gradients for logits, logarithms and harmonics into gradients for what was given.
 void to_given(const SplatArraysGiven& given, reference::SplatGradients<double>& d) {
     auto& d_opacity = attribute_values(d, ATTRIBUTE_OPACITY_LOGIT);
     const std::span<const float> opacities = given.opacities.values();

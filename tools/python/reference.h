@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The double reference, for tests.
+// The double-precision reference, for tests.
 #pragma once
 
 #include <pybind11/pybind11.h>

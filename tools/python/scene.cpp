@@ -75,7 +75,7 @@ KeptRenderer& PyScene::renderer(const RendererKey& key) {
 
 namespace {
 
-// A look at the model's own floats, which live as long as the scene.
+// A view of the model's own floats, which live as long as the scene.
 py::array view_of(const py::object& scene, const std::vector<float>& values,
                   std::vector<py::ssize_t> shape) {
     py::array_t<float> array(std::move(shape), values.data(), scene);
@@ -123,7 +123,7 @@ void bind_attribute(py::class_<PyScene>& scene, const char* name, const char* do
         doc);
 }
 
-// What logarithms and logits can hold.
+// The smallest values that logarithms and logits can hold.
 constexpr double kLeastScale = 1e-8, kLeastOpacity = 1e-6;
 
 PyScene scene_of_arrays(const py::dict& options) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// darb.psi, darb.sim1d and darb.plan: what the commands of these names write as JSON.
+// darb.psi, darb.sim1d and darb.plan: the JSON that the commands of these names write.
 #include "tools/python/study.h"
 
 #include <fmt/format.h>
@@ -23,7 +23,7 @@ py::object loaded(const nlohmann::json& json) {
     return py::module_::import("json").attr("loads")(text);
 }
 
-// One or several, as a sequence.
+// Takes one item or several as a sequence.
 std::vector<py::object> several(const py::object& value) {
     std::vector<py::object> list;
     if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value))
@@ -88,7 +88,7 @@ std::vector<int> take_signals(const py::object& value) {
     return signals;
 }
 
-// A signal, a kernel and a number of terms at a time, so that Ctrl-C ends it soon.
+// Runs one signal, kernel and number of terms at a time, so that Ctrl-C ends it soon.
 py::object sim1d(const py::dict& given) {
     Study1dOptions study;
     const std::vector<int> signals = take_signals(given["signals"]);

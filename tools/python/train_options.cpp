@@ -38,13 +38,13 @@ constexpr OfCommand kOfCommand[] = {
     {"checkpoint_interval", "Call checkpoint(path) when you want it."},
 };
 
-// How the command shows a run, which no request holds.
+// Options of how the command shows a run, which no request holds.
 constexpr OfCommand kShown[] = {
     {"view", "Render with scene().render(...) between two steps."},
     {"quiet", "Nothing is printed in any case."},
 };
 
-// nullptr: a Trainer takes it, too.
+// nullptr where a Trainer takes the option, too.
 const OfCommand* row_of_command(const RequestOption& option) {
     for (const OfCommand& one : kOfCommand)
         if (&request_option(one.name) == &option) return &one;
@@ -69,7 +69,7 @@ std::string value_text(const py::object& value, const std::string& name) {
                 "Give a number, a text, or True for a flag.");
 }
 
-// What was given by name, without a kernel that is an object.
+// The options that were given by name, without a kernel that is an object.
 GivenOptions given_options(const py::dict& options) {
     GivenOptions given;
     for (const auto& [key, handle] : options) {

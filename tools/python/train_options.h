@@ -9,12 +9,12 @@
 
 namespace darb::python {
 
-/// The complete request of names with underscores for dashes; True and False for a switch. dataset:
-/// its path, empty where it is read already. Throws Error as the command does, and for options of
-/// what only the command has: output folder, window, saving.
+/// Makes the complete request. Names have underscores for dashes, and switches take True and False.
+/// dataset: its path, empty where it has been read already. Throws Error as the command does, and
+/// for options that only the command has: output folder, window, saving.
 TrainRequest take_train_options(const py::dict& options, std::string dataset);
 
-/// Every option that take_train_options() takes, by its name, as the request has it.
+/// Every option that take_train_options() takes, by name, with its value in the request.
 py::dict asked_options(const TrainRequest& request);
 
 }  // namespace darb::python

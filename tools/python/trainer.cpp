@@ -21,7 +21,8 @@ namespace darb::python {
 
 namespace {
 
-// Whose lens and size the data set was read with; the options say so only for a path.
+// The options name the lens and size only for a path; a data set keeps those with which it was
+// read.
 Dataset take_dataset(const py::object& given, const py::dict& options,
                      const TrainRequest& request) {
     Dataset dataset;
@@ -44,7 +45,7 @@ py::array picture_array(const ImageF& image) {
     return to_array(image.data, {image.height, image.width, image.channels});
 }
 
-// What a loss of Python's returns: an array, as its picture is.
+// The gradient that a Python loss returns: an array with the picture's shape.
 ImageF ask_python(const py::object& loss, const TrainingPicture& picture) {
     const py::gil_scoped_acquire gil;
     py::dict view;
@@ -61,7 +62,7 @@ ImageF ask_python(const py::object& loss, const TrainingPicture& picture) {
     return result;
 }
 
-// Marks the device while a step runs: its callbacks may draw, but not train.
+// Marks the device while a step runs: callbacks may draw, but not train.
 class Training {
   public:
     explicit Training(PyDevice& device) : device_(device) {
@@ -92,7 +93,7 @@ PyTrainer::PyTrainer(std::shared_ptr<PyDevice> device, const py::object& dataset
     try {
         make_trainer();
     } catch (...) {
-        trainer_.reset();  // under the lock
+        trainer_.reset();  // destroyed under the lock
         if (job_.options.max_memory_bytes) device_->device().set_memory_budget(0);
         throw;
     }
@@ -104,7 +105,7 @@ void PyTrainer::make_trainer() {
         check_frame(device, view.camera.width, view.camera.height, view.name);
     job_ = resolve(std::move(job_.request), std::move(job_.dataset));
     find_start(device, job_);
-    job_.start.reset();  // its pictures are for a run's folder
+    job_.start.reset();  // its pictures are only for a run's folder
     check_signals();
     photos_ = photos_of_run(job_.dataset, job_.options, std::move(job_.photos));
     check_signals();

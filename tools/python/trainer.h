@@ -15,13 +15,13 @@ namespace darb::python {
 
 class PyTrainer {
   public:
-    /// dataset: a PyDataset or a path. options: by the names of the command line.
+    /// dataset: a PyDataset or a path. options: named as on the command line.
     PyTrainer(std::shared_ptr<PyDevice> device, const py::object& dataset, const py::dict& options);
     ~PyTrainer();
     PyTrainer(const PyTrainer&) = delete;
     PyTrainer& operator=(const PyTrainer&) = delete;
 
-    /// n iterations, fewer where the run ends; -> what the last one tells.
+    /// Runs n iterations, or fewer where the run ends; returns what the last one reports.
     py::dict step(const py::object& n, const py::object& loss);
     py::dict evaluate();
     SplatModel model();

@@ -173,8 +173,8 @@ constexpr float kFull = static_cast<float>(0.5 / SH_C0);  // sh_dc of a channel 
 std::array<double, kChannels> picture_means(const ImageF& picture) {
     std::array<double, kChannels> sum{};
     for (std::size_t i = 0; i < picture.data.size(); ++i) sum[i % kChannels] += picture.data[i];
-    const double pixels = static_cast<double>(picture.data.size() / kChannels);
-    for (double& s : sum) s /= pixels;
+    const std::size_t pixels = picture.data.size() / kChannels;
+    for (double& s : sum) s /= static_cast<double>(pixels);
     return sum;
 }
 

@@ -154,8 +154,8 @@ double BlocksRun::coarse_scale() const {
         const Camera& camera = job_.dataset.views[v].camera;
         bytes += 4.0 * camera.width * camera.height;
     }
-    return std::min(kCoarseScale,
-                    std::sqrt(double(*job_.options.max_memory_bytes / kCoarsePhotos) / bytes));
+    const std::uint64_t photo_bytes = *job_.options.max_memory_bytes / kCoarsePhotos;
+    return std::min(kCoarseScale, std::sqrt(static_cast<double>(photo_bytes) / bytes));
 }
 
 // Goes on from the part's own checkpoint, where there is one.

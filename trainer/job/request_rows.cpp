@@ -117,17 +117,16 @@ std::string strategy_help() {
 // What changes many others at once.
 void whole_rows(Rows& rows) {
     static const std::string presets = preset_help();
-    rows.push_back(
-        {.row = {.flags = "--schedule",
-                 .group = option_group::kRates,
-                 .help = "3dgs: its rates, limits, resets and background, no regularisers, "
-                         "harmonics by the iteration, whole photos, in runs of any length; options "
-                         "that are given beside it count",
-                 .usual = "darb"},
-         .words = "darb,3dgs",
-         .key = "schedule",
-         .place = [](Request& r) -> RequestPlace { return &r.schedule; },
-         .take = [](Request& r, Text text) { use_schedule(r, text); }});
+    rows.push_back({.row = {.flags = "--schedule",
+                            .group = option_group::kRates,
+                            .help = "3dgs: the rates, limits, resets and background of 3DGS, no "
+                                    "regularisers, harmonics by the iteration, whole photos, in "
+                                    "runs of any length; options given beside it overrule it",
+                            .usual = "darb"},
+                    .words = "darb,3dgs",
+                    .key = "schedule",
+                    .place = [](Request& r) -> RequestPlace { return &r.schedule; },
+                    .take = [](Request& r, Text text) { use_schedule(r, text); }});
     rows.push_back({.row = {.flags = "--preset", .help = presets.c_str()},
                     .words = "preview,good,full",
                     .key = "preset",
@@ -172,7 +171,7 @@ void place_rows(Rows& rows) {
     rows.push_back(
         {.row = {.flags = "--hold-out",
                  .group = option_group::kInput,
-                 .help = "which: every:N, arc:N of the way around, or both",
+                 .help = "which views: every:N, arc:N of the way around, or both",
                  .usual = "every:8"},
          .section = "data",
          .key = "hold_out",
@@ -194,25 +193,27 @@ void photo_rows(Rows& rows) {
                     .key = "images",
                     .place = [](Request& r) -> RequestPlace { return &r.data.images_folder; },
                     .saved = shared_images});
-    rows.push_back({.row = {.flags = "--sequential",
-                            .group = option_group::kPhotos,
-                            .help = "photos without cameras: match neighbours in name order only; "
-                                    "--preset preview does so by itself where more than 40 photos "
-                                    "follow each other",
-                            .is_switch = true},
-                    .section = "data",
-                    .key = "sequential",
-                    .place = [](Request& r) -> RequestPlace { return &r.sequential; }});
-    rows.push_back({.row = {.flags = "--frames",
-                            .group = option_group::kPhotos,
-                            .help = "of a video: so many pictures, the sharpest of as many "
-                                    "intervals",
-                            .usual = "two a second of 30, 60 to 240",
-                            .least = 3,
-                            .most = 2'000},
-                    .section = "data",
-                    .key = "frames",
-                    .place = [](Request& r) -> RequestPlace { return &r.frames; }});
+    rows.push_back(
+        {.row =
+             {.flags = "--sequential",
+              .group = option_group::kPhotos,
+              .help =
+                  "photos without cameras: match only neighbours in the order of names; --preset "
+                  "preview does so by itself where more than 40 photos follow each other",
+              .is_switch = true},
+         .section = "data",
+         .key = "sequential",
+         .place = [](Request& r) -> RequestPlace { return &r.sequential; }});
+    rows.push_back(
+        {.row = {.flags = "--frames",
+                 .group = option_group::kPhotos,
+                 .help = "take this many pictures from a video, the sharpest of as many intervals",
+                 .usual = "about two a second, 60 to 240 in all",
+                 .least = 3,
+                 .most = 2'000},
+         .section = "data",
+         .key = "frames",
+         .place = [](Request& r) -> RequestPlace { return &r.frames; }});
     rows.push_back({.row = {.flags = "--lens",
                             .group = option_group::kPhotos,
                             .help = "undistort: straight pictures; original: distorted as the "
@@ -226,8 +227,8 @@ void photo_rows(Rows& rows) {
                     .saved = [](const Request& r) -> std::string { return lens_of(r.data); }});
     rows.push_back({.row = {.flags = "--depth-scale",
                             .group = option_group::kPhotos,
-                            .help = "world units a metre of depths/ and depth/ beside the photos",
-                            .usual = "by the points that photos saw, else 1",
+                            .help = "world units per metre in depths/ and depth/ beside the photos",
+                            .usual = "from the points that photos saw, else 1",
                             .least = 1e-9,
                             .most = 1e9},
                     .section = "data",
@@ -236,13 +237,14 @@ void photo_rows(Rows& rows) {
 }
 
 void run_rows(Rows& rows) {
-    rows.push_back(
-        {.row = {.flags = "--resume", .help = "go on from OUT/checkpoint.darb", .is_switch = true},
-         .place = [](Request& r) -> RequestPlace { return &r.resume; }});
+    rows.push_back({.row = {.flags = "--resume",
+                            .help = "continue from OUT/checkpoint.darb",
+                            .is_switch = true},
+                    .place = [](Request& r) -> RequestPlace { return &r.resume; }});
     rows.push_back({.row = {.flags = "--allow-mixed",
                             .group = option_group::kDevice,
-                            .help = "ranks of mpirun may have other devices and drivers; the "
-                                    "result then depends on which",
+                            .help = "let ranks of mpirun have different devices and drivers, on "
+                                    "which the result then depends",
                             .is_switch = true},
                     .key = "allow_mixed",
                     .place = [](Request& r) -> RequestPlace { return &r.allow_mixed; }});
@@ -290,18 +292,18 @@ void scene_rows(Rows& rows) {
          .key = "strategy",
          .take = take_strategy,
          .saved = [](const Request& r) { return std::string(strategy_name(r.train.strategy)); }});
-    rows.push_back({.row = {.flags = "--start",
-                            .group = option_group::kStart,
-                            .help = "what splats start from; dense: surfaces that stereo between "
-                                    "the photos finds; auto: points of the data set, else dense, "
-                                    "else random",
-                            .usual = "auto"},
-                    .words = "auto,points,dense,random",
-                    .key = "start",
-                    .take = take_start,
-                    .saved = [](const Request& r) -> std::string {
-                        return kStarts[static_cast<int>(r.train.start)];
-                    }});
+    rows.push_back(
+        {.row = {.flags = "--start",
+                 .group = option_group::kStart,
+                 .help = "what splats start from; dense: surfaces found by stereo between the "
+                         "photos; auto: the data set's points, else dense, else random",
+                 .usual = "auto"},
+         .words = "auto,points,dense,random",
+         .key = "start",
+         .take = take_start,
+         .saved = [](const Request& r) -> std::string {
+             return kStarts[static_cast<int>(r.train.start)];
+         }});
 }
 
 void effect_rows(Rows& rows) {
@@ -317,26 +319,26 @@ void effect_rows(Rows& rows) {
          .take = [](Request& r, Text text) { r.effects = effects_beside(r.effects, text); }});
     rows.push_back({.row = {.flags = "--antialiasing",
                             .group = option_group::kEffects,
-                            .help = "as --effects +antialias",
+                            .help = "the same as --effects +antialias",
                             .is_switch = true},
                     .key = "antialiasing",
                     .place = [](Request& r) -> RequestPlace { return &r.antialiasing; }});
     rows.push_back({.row = {.flags = "-d,--depths",
                             .group = option_group::kEffects,
-                            .help = "as --effects +depth; FOLDER: of the measured depths, depths "
-                                    "or depth in the data set"},
+                            .help = "the same as --effects +depth; FOLDER: where the measured "
+                                    "depths are, otherwise depths or depth in the data set"},
                     .place = [](Request& r) -> RequestPlace { return &r.depths; }});
     rows.push_back({.row = {.flags = "--refine-cameras",
                             .group = option_group::kEffects,
-                            .help = "train poses and intrinsics beside the splats, as --effects "
-                                    "+cameras; auto: as the plan says, off",
+                            .help = "train poses and intrinsics along with the splats, as "
+                                    "--effects +cameras does; auto: as planned, which is off",
                             .usual = "auto"},
                     .words = "auto,on,off",
                     .key = "refine_cameras",
                     .place = [](Request& r) -> RequestPlace { return &r.refine_cameras; }});
     rows.push_back({.row = {.flags = "--blocks",
                             .group = option_group::kScene,
-                            .help = "train a scene too large for the memory in parts"},
+                            .help = "train a scene that is too large for the memory in parts"},
                     .words = "auto,NxM",
                     .key = "blocks",
                     .place = [](Request& r) -> RequestPlace { return &r.blocks; }});
@@ -371,8 +373,8 @@ RequestOption accuracy_row(int setting) {
 void accuracy_rows(Rows& rows) {
     rows.push_back({.row = {.flags = "--pulses",
                             .group = option_group::kAccuracy,
-                            .help = "of raised_cosine and sinc: 2 or 3 keep rings that the paper's "
-                                    "limit removes",
+                            .help = "pulses of raised_cosine and sinc: 2 or 3 keep rings that the "
+                                    "paper's limit removes",
                             .usual = "1",
                             .least = 1,
                             .most = KERNEL_MAX_PULSES},
@@ -419,17 +421,17 @@ void saving_rows(Rows& rows) {
     list("--checkpoint-iterations", "keep a checkpoint of its own after these",
          "checkpoint_iterations",
          [](Request& r) -> RequestPlace { return &r.checkpoint_iterations; });
-    rows.push_back({.row = {.flags = "--checkpoint-interval",
-                            .group = option_group::kSaving,
-                            .help = "refresh checkpoint.darb every so many iterations; 0: at the "
-                                    "end only",
-                            .usual = "1000"},
-                    .key = "checkpoint_interval",
-                    .place = [](Request& r) -> RequestPlace { return &r.checkpoint_interval; }});
+    rows.push_back(
+        {.row = {.flags = "--checkpoint-interval",
+                 .group = option_group::kSaving,
+                 .help = "refresh checkpoint.darb every this many iterations; 0: only at the end",
+                 .usual = "1000"},
+         .key = "checkpoint_interval",
+         .place = [](Request& r) -> RequestPlace { return &r.checkpoint_interval; }});
     rows.push_back(
         {.row = {.flags = "--start-checkpoint",
                  .group = option_group::kSaving,
-                 .help = "go on from this checkpoint"},
+                 .help = "continue from this checkpoint"},
          .key = "start_checkpoint",
          .place = [](Request& r) -> RequestPlace { return &r.start_checkpoint; },
          .saved = [](const Request& r) { return path_in_file(r, r.start_checkpoint); },

@@ -81,7 +81,7 @@ double option_real(const OptionRow& row, const std::string& text);
 void set_option(const OptionRow& row, const std::string& text, TrainOptions& options);
 
 /// A row's member as it was asked for, for a saved request: null where it is absent, as where the
-/// row has no member. set_member takes it back; it throws Error for a value of another type or out
+/// row has no member. set_member takes it back and throws Error for a value of another type or out
 /// of limits.
 nlohmann::json member_json(const OptionRow& row, const TrainOptions& options);
 void set_member(const OptionRow& row, const nlohmann::json& value, TrainOptions& options);

@@ -83,7 +83,7 @@ struct TrainOptions {
     std::optional<float> position_lr_init, position_lr_final;
     std::optional<float> scale_lr, rotation_lr, opacity_lr;
     float sh_dc_lr = 2.5e-3f;
-    // Of a kernel with shapes; absent: 0.004 times Schedule::speedup
+    // The rate of a kernel with shapes; absent: 0.004 times Schedule::speedup
     // (docs/experiments/learned_shapes.md).
     std::optional<float> shape_lr;
     // Whether the rate of the other bands, a twentieth of it, is multiplied by 30,000 / iterations,
@@ -125,7 +125,7 @@ struct TrainOptions {
     // Whether each round of density control ends with the splats in Morton order in memory.
     bool morton_order = false;
     std::optional<std::uint32_t> max_splats;        // absent: any number
-    std::optional<std::uint64_t> max_memory_bytes;  // of device memory: growth stops before it
+    std::optional<std::uint64_t> max_memory_bytes;  // device memory: growth stops before this
 
     float noise_lr = 5e5f;  // mcmc: noise on positions, over the rate of positions
     // The first iterations see smaller photos; see trainer/step/photos.h.

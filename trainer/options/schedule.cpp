@@ -34,7 +34,7 @@ float speedup_of(const TrainOptions& o) {
     return o.speed_up_short_runs ? std::clamp(times, 1.0f, kMostSpeedup) : 1.0f;
 }
 
-// Of what would not settle in a run shorter than the 30,000 iterations of 3DGS.
+// Scales the rates of what would not settle in a run shorter than the 30,000 iterations of 3DGS.
 float rate_scale_of(const TrainOptions& o) {
     return std::sqrt(std::max(1.0f, 30'000.0f / static_cast<float>(std::max(o.iterations, 1))));
 }

@@ -15,7 +15,7 @@ namespace darb {
 
 /// Some iterations that begin a run and see smaller photos.
 struct RampStep {
-    int divisor;     // of the photos' sides
+    int divisor;     // divides the photos' sides
     int iterations;  // how many see photos of this size
 };
 
@@ -29,8 +29,8 @@ class Schedule {
     struct Rates {
         double position = 0;
         float scale = 0, rotation = 0, opacity = 0;
-        float shape = 0;               // of a kernel with shapes
-        float sh_dc = 0, sh_rest = 0;  // of steps of the mean of rest_every iterations
+        float shape = 0;               // for a kernel with shapes
+        float sh_dc = 0, sh_rest = 0;  // sh_rest: for a step by the mean of rest_every iterations
     };
     Rates rates(int iteration) const;
     double position_rate(int iteration) const;
@@ -108,10 +108,10 @@ class Schedule {
     Rates first;                    // at the start of the run
     float last_position_rate = 0;   // where it has fallen to its end
     double position_falls_for = 1;  // share of the run, then it stays
-    double last_share = 1;          // of the other rates, fallen to over the second half
+    double last_share = 1;          // what the other rates fall to over the second half
     int average_begin = 0;
     double length_scale = 1;  // multiplies every length that options have for a Gaussian
-    float largest_scale = 0;  // of a splat, over scene_reach() and length_scale; 0: no limit
+    float largest_scale = 0;  // a splat's limit, over scene_reach() and length_scale; 0: none
 };
 
 }  // namespace darb

@@ -38,8 +38,8 @@ struct StrategyDefaults {
 /// What a forecast of the splats at the end goes by.
 struct GrowthStart {
     std::uint32_t splats = 0;
-    std::uint64_t photo_pixels = 0;  // of all training photos
-    PhotoDetail detail{};            // of them, as Dataset::detail
+    std::uint64_t photo_pixels = 0;  // all training photos together
+    PhotoDetail detail{};            // the photos' Dataset::detail
     std::uint32_t limit = 0;         // what the device and options.max_splats allow
     bool random = false;             // adc's first rounds take most of these, so fewer may be left
     bool dense = false;              // points on surfaces, found by comparing photos

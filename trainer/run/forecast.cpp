@@ -29,7 +29,7 @@ namespace darb {
 namespace {
 
 // The stand-in for a trained scene: most trained splats are more opaque than those at the start.
-constexpr float kTrainedLogit = 0;  // of an opacity of a half
+constexpr float kTrainedLogit = 0;  // an opacity of a half
 
 // The measurement: enough to average over, no more than a moment.
 constexpr int kViews = 4, kIterations = 10;
@@ -230,9 +230,10 @@ std::uint64_t splats_with_smaller_photos(const Schedule& schedule, const Forecas
     return std::max<std::uint64_t>(f.start_splats, grown);
 }
 
-// The most of what the end takes; of the last rounds of density control and drops of splats, with
-// the colour that there is by then; and of the first iterations, with smaller photos or before most
-// of a random start goes. photos: as add_photos counts them, the ramp's smaller ones among them.
+// The peak is the most of three: what the end takes; what the last rounds of density control and
+// drops of splats take, with the colour that there is by then; and what the first iterations take,
+// with smaller photos or before most of a random start is gone. photos: as add_photos counts them,
+// including the ramp's smaller ones.
 void find_peak(const Device& device, const Schedule& schedule, const MemoryDemand& photos,
                Forecast& f) {
     const TrainOptions& options = schedule.options;
@@ -304,7 +305,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const Schedu
     const MemoryDemand photos = f.demand;
     f.demand.small_pixels = f.demand.small_cameras = 0;  // none at the end
     f.demand.sh_degree = predict_degree(schedule, options.iterations);
-    start.sh_degree = f.demand.sh_degree;  // of the times
+    start.sh_degree = f.demand.sh_degree;  // the degree for the times
     if (options.probe_sh)
         start.sh_degree =
             std::min(start.sh_degree, options.iterations / 2 / schedule.degree_interval);
@@ -331,13 +332,13 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const Schedu
 
 namespace {
 
-// Of a point: position and colour, drawn one by one, so that their room may be twice as large.
+// Bytes per point: position and colour, added one by one, so that their room may be twice as large.
 constexpr std::uint64_t kPointBytes = 3 * (8 + 1);
-// Of a splat on the host while the model is made: its floats without the bands of colour, its
-// distance to its neighbours, and what the search tree holds of it.
+// Bytes per splat on the host while the model is made: its floats without the bands of colour, its
+// distance to its neighbours, and its part of the search tree.
 constexpr std::uint64_t kSplatBytes = splat_floats(0) * sizeof(float) + 8 + 16;
 
-// Of this process; the most there is where the system does not say.
+// The address space of this process, or the largest possible where the system does not tell.
 std::uint64_t address_space() {
     std::ifstream lines("/proc/self/status");
     for (std::string key; lines >> key; lines.ignore(1'000, '\n')) {

@@ -26,8 +26,8 @@ constexpr double kForecastIterations = 10;
 // A step that takes more times as long as the others is no pace: a probe of the colour's degree, an
 // evaluation, a scene that is saved. Where a device slows down for good, the steps follow.
 constexpr double kOutlier = 2;
-// Where no forecast was measured: of an iteration's time so much goes with the splats, and photos
-// of a half and of a quarter of the sides take such shares.
+// Used where no forecast was measured: how much of an iteration's time grows with the splats, and
+// what share of it photos with a half and a quarter of the sides take.
 constexpr double kSplatShare = 0.5, kHalfSides = 0.5, kQuarterSides = 0.35;
 // A forecast is measured in a moment in which the machine may be busy, and then it says what cannot
 // be: so much of the time of whole photos is the least for a half and for a quarter of the sides,
@@ -181,7 +181,7 @@ void TimeLeft::add(int iteration, double seconds, std::uint32_t splats) {
     splats_ = splats;
 }
 
-// Of the growth that is forecast: the share that has come lately.
+// The share of the forecast growth that has come lately.
 double TimeLeft::growth() const {
     if (grown_.modelled == 0) return 1;
     const double share = std::clamp(grown_.ratio(), 0.0, kMostGrowth);

@@ -22,7 +22,7 @@ struct PaceForecast {
     bool falls = false;                          // Forecast::falls
     double start_ms = 0, end_ms = 0;             // an iteration on whole photos; 0: not measured
     std::vector<double> ramp_ms;                 // Forecast::ramp_ms
-    int longest_side = 0;                        // of the photos, px
+    int longest_side = 0;                        // the photos', px
 };
 
 PaceForecast pace_of(const Forecast& forecast);
@@ -56,14 +56,14 @@ class TimeLeft {
 
     int iterations_, probe_at_ = 0, probe_iterations_ = 0;  // 0: there is no probe
     bool has_target_ = false;                               // the strategy's end is known
-    double limit_ = 0;                                      // of the splats
+    double limit_ = 0;                                      // most splats
     PaceForecast pace_;
     std::vector<double> counts_;  // [iteration] splats, as forecast
     std::vector<double> ramp_;    // [iteration] share of the time on whole photos
     int iteration_ = 0;
     double last_s_ = 0, splats_ = 0;
-    Faded steady_, quick_;  // of the time
-    Faded grown_;           // of the splats that were added, expected ones as the model
+    Faded steady_, quick_;  // milliseconds
+    Faded grown_;           // splats added, relative to the model's expectation
     bool any_ = false;
 };
 
@@ -93,7 +93,7 @@ class Progress {
     int first_, last_;
     bool quiet_, terminal_;
     Clock::time_point start_, last_print_;
-    Clock::time_point begin_;  // of the whole run, which restart_rate() leaves
+    Clock::time_point begin_;  // the whole run's begin, which restart_rate() keeps
     std::optional<TimeLeft> left_;
     double loss_ = 0, psnr_db_ = 0;  // smoothed
     bool any_ = false;

@@ -131,7 +131,7 @@ class Run {
     std::vector<ImageU8> photos_;  // [view]; while it trains of held-out views alone
     const std::string fingerprint_;
     const DeviceRates rates_;
-    const std::string tuning_;              // of this device, before the checkpoint's is used
+    const std::string tuning_;              // this device's, before the checkpoint's is used
     std::optional<Checkpoint> checkpoint_;  // to go on with, until resume()
     Trainer trainer_;
     GainWatch watch_;
@@ -307,7 +307,8 @@ TrainResult Run::execute(const std::atomic<bool>* stop) {
     trainer_.on_result = [this](const IterationResult& result) { on_result(result); };
     begin();
     if (!run_.resume_from.empty() && is_finished()) return finished();
-    // Of where the run was interrupted; it goes on, and its scene is the latest until it has ended.
+    // The file is from the end that was interrupted. The run goes on, and its scene is the latest
+    // until it ends.
     std::error_code none;
     std::filesystem::remove(run_.output / "metrics.json", none);
     const std::optional<PaceForecast> pace = run_.pace ? run_.pace : log_.pace();
@@ -355,7 +356,7 @@ void Run::save_what_is_there(bool failed) {
                                    run_.output.string()));
 }
 
-// Of the backward blend, where that holds more intersections.
+// Recommends the other form of the backward blend, where that holds more intersections.
 std::string Run::other_way() const {
     if (device_.tuning().backward == BackwardBlend::subgroup) return "";
     return fmt::format(
@@ -403,7 +404,7 @@ void Run::train(const std::atomic<bool>* stop) {
     stopwatch(false);
 }
 
-// Of the iterations (begin, now].
+// Handles the iterations (begin, now].
 void Run::after_step(int begin) {
     report_resolution();
     report_memory();

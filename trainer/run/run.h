@@ -30,15 +30,14 @@ namespace darb {
 struct LiveStep {
     const GpuSplats& splats;  // Trainer::splats
     int iteration = 0, last_iteration = 0;
-    const IterationResult& result;  // of the latest iteration whose result is known
+    const IterationResult& result;  // the latest iteration whose result is known
     const std::vector<Evaluation>& evaluations;
 };
 
 struct RunOptions {
     std::filesystem::path output;
     std::vector<int> test_iterations, save_iterations, checkpoint_iterations;
-    int checkpoint_interval =
-        1'000;  // of checkpoint.darb, the latest; 0: only at the end and Ctrl-C
+    int checkpoint_interval = 1'000;    // refreshes checkpoint.darb; 0: only at the end and Ctrl-C
     std::filesystem::path resume_from;  // empty: start afresh
     bool quiet = false;
     bool report = true;  // report.html at the end
@@ -50,7 +49,7 @@ struct RunOptions {
     /// no training time.
     std::function<double(const LiveStep&)> on_step;
     std::optional<PaceForecast> pace;  // for the time that is left, and for the log
-    std::string request;               // of request.json, for --resume; may be empty
+    std::string request;               // content of request.json, for --resume; may be empty
     std::string effects;               // the plan in a line, for the log
     std::string effects_json;          // the same as JSON, for metrics.json; may be empty
     RankGroup ranks;                   // that train together; the first one writes and talks
@@ -68,8 +67,7 @@ struct TrainResult {
     int iteration = 0;
     bool interrupted = false;
     double seconds = 0;
-    // Of this process's steps, with several ranks: what it sent, and how long that took and it
-    // waited.
+    // With several ranks, what this process sent in its steps, and how long that and waiting took.
     int trained_steps = 0;
     std::uint64_t sent_bytes = 0;
     double exchange_seconds = 0;

@@ -130,7 +130,7 @@ void set_aside(const fs::path& output) {
 
 namespace {
 
-// Of write_file_atomic: NAME.tmp and NAME.N.tmp; the NAME, or nothing.
+// The NAME that a temporary file of write_file_atomic (NAME.tmp or NAME.N.tmp) is for, or nothing.
 std::string target_of(const fs::path& temporary) {
     const std::regex pattern(R"((.+?)(\.[0-9]+)?\.tmp)");
     const std::string name = temporary.filename().string();

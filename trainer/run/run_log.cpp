@@ -267,7 +267,7 @@ void RunLog::evaluation(const Evaluation& evaluation) {
 }
 
 void add_events(const std::vector<Json>& events, ReportData& data) {
-    std::string sizes;  // of the photos, where they changed
+    std::string sizes;  // the photos' sizes, where they changed
     for (const Json& e : events) {
         const std::string kind = e.value("event", "");
         if (kind == "iteration") {

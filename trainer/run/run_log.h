@@ -40,7 +40,7 @@ class RunLog {
     void start(const Device& device, const DeviceRates& rates, const Dataset& dataset,
                const Schedule& schedule, std::uint32_t splats, const std::string& effects_json,
                const std::optional<PaceForecast>& pace);
-    /// Of the run that goes on, where it had one.
+    /// The pace of the run that goes on, where it had one.
     std::optional<PaceForecast> pace() const;
     /// Keeps one line in kLogInterval. counters: of the run so far; totals: of the passes, as
     /// Trainer sums them.
@@ -54,7 +54,7 @@ class RunLog {
     void growth_stopped(int iteration, const char* limit, std::uint32_t splats);
     /// There was no room for the mean that the run was to end with.
     void mean_left_out(int iteration);
-    /// Of a run that may end itself: what held-out photos are at, and that it ends.
+    /// For a run that may end by itself: logs the PSNR of held-out photos, or that the run ends.
     void look(int iteration, double psnr_db);
     void ends_early(int iteration, int end, const std::string& reason);
     /// What ended the run before its time; nothing where the log cannot be written.
@@ -77,7 +77,7 @@ class RunLog {
     std::string shared_text(const std::string& text) const;  // without the folders of this machine
     ReportData report_data(const TrainResult& summary) const;
 
-    std::filesystem::path folder_, root_;  // of the run and of its data set
+    std::filesystem::path folder_, root_;  // the run's and the data set's
     std::vector<nlohmann::json> events_;
     std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_{nullptr, &std::fclose};
     double loss_sum_ = 0, psnr_sum_ = 0;

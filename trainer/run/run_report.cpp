@@ -16,7 +16,7 @@ namespace darb {
 
 namespace {
 
-constexpr int kJpegQuality = 92;  // of the pictures: a tenth of their PNGs' size
+constexpr int kJpegQuality = 92;  // the pictures take a tenth of the size of PNGs
 
 struct TimeUnit {
     const char* label;
@@ -218,7 +218,7 @@ void write_report(const std::filesystem::path& path, const ReportData& data) {
 
 namespace {
 
-// Of the views in the arc, or of the others.
+// The means over the views in the arc, or over the others.
 ArcMeans means_of(const std::vector<ViewMetrics>& views, bool in_arc) {
     ArcMeans means;
     double count = 0;

@@ -19,9 +19,9 @@ namespace darb {
 
 struct ReportSample {  // a point of the training curves, averaged or not
     int iteration = 0;
-    double seconds = 0;  // of training
+    double seconds = 0;  // training time
     double loss = 0;
-    double psnr_db = 0;  // of the training batch
+    double psnr_db = 0;  // mean over the training batch
     std::uint32_t splats = 0;
     std::vector<double> pass_ms = {};  // per iteration, by ReportData::passes; may be empty
 };
@@ -47,7 +47,7 @@ struct ReportPass {
 };
 
 struct ReportPicture {
-    std::string name;            // of the view
+    std::string name;            // the view's name
     std::filesystem::path file;  // PNG: photo, render and error side by side, equal widths
     double psnr_db = 0, ssim = 0;
 };
@@ -61,7 +61,7 @@ struct ReportData {
     std::vector<ReportPass> passes;             // in the order they run
     std::vector<std::pair<std::string, std::string>> settings;
     std::vector<ReportPicture> pictures;
-    std::string error_caption = "error x 4";  // of the third part of the pictures
+    std::string error_caption = "error x 4";  // caption of the third part
     std::vector<std::string> notes;           // a sentence each
 };
 
@@ -81,7 +81,7 @@ struct ArcMeans {  // over the views of an arc that was held out
 
 struct Evaluation {
     int iteration = 0;
-    double seconds = 0;  // of training, evaluation left out
+    double seconds = 0;  // training time, without evaluations
     std::uint32_t splats = 0;
     std::vector<ViewMetrics> views;
     double psnr_db = 0, ssim = 0;  // means over the views; but for an arc, where others are there

@@ -50,7 +50,7 @@ void for_each_array(State& state, Visit visit) {
 }
 
 std::uint32_t checksum(std::span<const std::byte> bytes, std::uint32_t before = 0) {
-    uLong crc = before;  // of nothing it is 0
+    uLong crc = before;  // 0 for no bytes
     while (!bytes.empty()) {
         const size_t part = std::min<size_t>(bytes.size(), 1u << 30);
         crc = crc32(crc, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(part));
@@ -109,7 +109,8 @@ Json header_of(const Checkpoint& c) {
 std::optional<int> kernel_of(const Json& h, const std::string& where) {
     if (!h.contains("kernel_definition"))
         return kernel_from_name(h.at("kernel").get<std::string>());
-    std::vector<std::string> notes;  // of another name, which check_resumable tells from the run's
+    // a kernel with another name; check_resumable compares it with the run's
+    std::vector<std::string> notes;
     return register_kernel_of_file(definition_from_json(h["kernel_definition"], where), where,
                                    notes);
 }
@@ -329,7 +330,7 @@ namespace {
 
 constexpr const char* kOtherCheckpoint = "Start from another checkpoint, or without --resume.";
 
-// Of the looks at held-out photos, and of the end that follows from the last of them.
+// Contradictions in the looks at held-out photos, and in the end that follows from the last one.
 std::string gain_contradiction(const GainState& gain, int iteration, Schedule schedule) {
     if (gain.looks.empty() && gain.end == 0) return "";
     if (schedule.options.end_without_gain == 0 || gain.looks.empty())

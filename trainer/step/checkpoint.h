@@ -19,9 +19,9 @@ struct Checkpoint {
     TrainerState state;
     std::string settings;                      // settings_text() of the run that wrote it
     std::string dataset;                       // dataset_fingerprint() of it
-    double seconds = 0;                        // of training until then
+    double seconds = 0;                        // training time until then
     std::string tuning = "backward=subgroup";  // result_tuning(): the only ones of older files
-    GainState gain = {};                       // of a run with end_without_gain
+    GainState gain = {};                       // for a run with end_without_gain
 };
 
 /// What a file holds.

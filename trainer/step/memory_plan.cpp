@@ -68,7 +68,7 @@ std::uint64_t image_bytes(const Device& device, const MemoryDemand& demand) {
 }
 
 std::uint64_t effect_bytes(const MemoryDemand& demand) {
-    std::uint64_t bytes = Buffer::charged_bytes(4);  // of the smoothing filter, where it is off
+    std::uint64_t bytes = Buffer::charged_bytes(4);  // the smoothing filter's, where it is off
     if (demand.smoothing_photos > 0)
         bytes = Buffer::charged_bytes(std::max<std::uint64_t>(demand.splats, 1) * 4) +
                 cameras_bytes(demand.smoothing_photos);
@@ -193,9 +193,10 @@ void add_photos(const std::vector<View>& views, const Schedule& schedule, Memory
 
 namespace {
 
-constexpr double kMemoryShare = 0.85;  // of the device's memory that a run can hope to have
+constexpr double kMemoryShare = 0.85;  // share of the device's memory that a run can hope for
 constexpr std::uint32_t kNoLimit = 0xFFFFFFFFu;
-// Of the intersections that the device binds: beyond, splats do not grow in number.
+// The share of the intersections that the device can bind; beyond it the number of splats stops
+// growing.
 constexpr double kMostIntersections = 0.7;
 }  // namespace
 
@@ -274,9 +275,10 @@ void MemoryBudget::record_round(const HeldMemory& held, std::uint32_t before) {
     planned_bytes_ = std::max(planned_bytes_, round_peak(*device_, round, before, held.splats));
 }
 
-// Of a frame with half more intersections than the fullest so far, in buffers that grew to half
-// more than those. From what a checkpoint holds, not from the size that the buffers came to have: a
-// run that is resumed, or shows other pictures meanwhile, has the same limit.
+// Memory for a frame with half more intersections than the fullest one so far, in buffers that have
+// grown to half more than that. It follows from what a checkpoint holds rather than from the
+// current size of the buffers, so that a run which is resumed, or shows other pictures meanwhile,
+// has the same limit.
 MemoryDemand MemoryBudget::growth_demand(const HeldMemory& held,
                                          const TrainCounters& counters) const {
     MemoryDemand grown = demand(held);
@@ -301,7 +303,7 @@ MemoryDemand MemoryBudget::growth_demand(const HeldMemory& held,
     return grown;
 }
 
-// Of the budget, less what is in use beyond the plan.
+// The budget without what is in use beyond the plan.
 std::uint64_t MemoryBudget::bytes_to_plan(const HeldMemory& held) const {
     const std::uint64_t budget = schedule_.options.max_memory_bytes.value_or(0);
     const std::uint64_t in_use = device_->allocated_bytes();

@@ -23,7 +23,7 @@ namespace darb {
 struct MemoryDemand {
     std::uint64_t splats = 0;         // N
     std::uint64_t intersections = 0;  // K that the buffers hold
-    int sh_degree = 3;                // of the buffers
+    int sh_degree = 3;                // the buffers' degree
     bool rest_sum = false;            // harmonics make a step in some iterations only
     bool densifies = true;            // density control runs at this N
     bool averages = false;            // the run ends with a mean of the splats
@@ -33,9 +33,9 @@ struct MemoryDemand {
     bool cooperates = false;             // as FrameSize
     std::uint32_t views = 0;             // held-out ones, too
     int width = 1, height = 1;           // px, the most of any view
-    std::uint64_t image_pixels = 1;      // of the largest training photo
-    std::uint64_t photo_pixels = 0;      // of all training photos together
-    std::uint64_t depth_pixels = 0;      // of those with measured depths that are compared
+    std::uint64_t image_pixels = 1;      // the largest training photo
+    std::uint64_t photo_pixels = 0;      // all training photos together
+    std::uint64_t depth_pixels = 0;      // photos with measured depths that are compared
     std::uint32_t exposure_photos = 0;   // photos whose exposure is trained; 0: the effect is off
     bool exposure_grid = false;          // each by a grid of maps
     std::uint32_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
@@ -43,8 +43,8 @@ struct MemoryDemand {
     int batch = 1;
     bool by_views = false;  // steps_by_views()
     bool cameras = false;   // are refined
-    // Of the resolution ramp: its smaller photos, of all training photos together, those with
-    // depths twice, and cameras.
+    // The resolution ramp's smaller photos: all training photos together, those with depths counted
+    // twice, and their cameras.
     std::uint64_t small_pixels = 0;
     std::uint32_t small_cameras = 0;
     bool streams = false;  // photos wait on the host
@@ -57,7 +57,7 @@ struct MemoryPlan {
     std::uint64_t intersections = 0;  // per splat-tile intersection
     std::uint64_t photos = 0;         // ground truth, or the two of them that are there at a time
     std::uint64_t images = 0;         // picture, its gradient, what the passes share
-    std::uint64_t effects = 0;        // of per-photo exposure, of the 3D filter and of the strategy
+    std::uint64_t effects = 0;        // per-photo exposure, 3D filter and strategy
     // For a time, beyond the rest: while density control runs; after it, the mean of the last
     // iterations.
     std::uint64_t densify = 0, average = 0;
@@ -99,17 +99,17 @@ void add_photos(const std::vector<View>& views, const Schedule& schedule, Memory
 /// budget alone calls for it, where it does not hold the start. photos: as add_photos gives them.
 bool photos_stream(const Device& device, const Dataset& dataset, const Schedule& schedule,
                    const MemoryDemand& photos, std::uint32_t start_splats);
-/// Of the device's memory, what a run can hope to have.
+/// How much of the device's memory a run can hope for.
 std::uint64_t usable_bytes(const DeviceInfo& info);
 
 /// What a run holds on the device at a moment.
 struct HeldMemory {
     std::uint32_t splats = 0;
-    int sh_degree = 0;  // of their buffers
+    int sh_degree = 0;  // degree of their buffers
     FrameSize frame;
     bool averages = false;           // a mean of the splats is there
-    int divisor = 1;                 // of the photos' sides; above 1 the next two
-    std::uint64_t small_pixels = 0;  // of the smaller photos
+    int divisor = 1;                 // divides the photos' sides; above 1 the next two
+    std::uint64_t small_pixels = 0;  // the smaller photos
     std::uint32_t small_cameras = 0;
 };
 
@@ -153,10 +153,10 @@ class MemoryBudget {
 
     Device* device_;
     Schedule schedule_;
-    MemoryDemand photos_;  // of photos, effects and strategy alone
+    MemoryDemand photos_;  // only photos, effects and strategy
     std::array<std::uint64_t, 6> recorded_{};
     std::uint64_t planned_bytes_ = 0;
-    std::uint32_t limit_ = 0, within_memory_ = 0;  // of the round under way
+    std::uint32_t limit_ = 0, within_memory_ = 0;  // in the round under way
     std::uint32_t stopped_by_memory_ = 0, stopped_by_intersections_ = 0;
 };
 

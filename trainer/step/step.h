@@ -70,12 +70,12 @@ LossOptions loss_options(const TrainOptions& options, const Dataset& dataset);
 struct StepInput {
     int iteration = 0;  // from 1
     TrainingView view;
-    int next_view = -1;  // of the step after it, where that is known
+    int next_view = -1;  // the next step's view, where that is known
     AdamStep adam;
     float exposure_rate = 0;
-    int exposure_visits = 1;              // of this photo, this step counted
+    int exposure_visits = 1;              // visits of this photo, including this step
     DensityStrategy* strategy = nullptr;  // that records into the step
-    // Of a batch: where the view's gradients go, in place of a step, and which of it the view is.
+    // In a batch: where the view's gradients go instead of a step, and which view of it this is.
     GradientBuffers* gradients = nullptr;
     int place = 0;
 };
@@ -85,7 +85,7 @@ struct StepOutcome {
     int iteration = 0;
     gpu::FrameStatus status;
     double loss = 0, mse = 0;  // mse: mean squared error of the picture
-    std::uint32_t pixels = 0;  // of the photo
+    std::uint32_t pixels = 0;  // the photo's
     std::vector<PassTime> passes;
     std::uint32_t redone = 0, overflows = 0;  // how often this step was done again, and why
     CameraTotals camera{};                    // dL/d(camera), where cameras are refined
@@ -180,7 +180,7 @@ class TrainingStep {
     std::optional<Exposure> exposure_;  // options.exposure
     std::optional<DepthLoss> depth_;    // options.depth
     float depth_weight_;
-    std::optional<AdamUpdate> adam_;     // of batches
+    std::optional<AdamUpdate> adam_;     // used for batches
     std::optional<CameraSums> cameras_;  // options.refine_cameras, of batches
     Buffer d_image_;
     Buffer given_d_image_;  // [3][H][W] of picture_gradient

@@ -17,8 +17,9 @@ namespace darb {
 
 namespace {
 
-constexpr int kStepsApart = 64;    // that mixed devices take between two looks at the first
-constexpr float kGridExtents = 4;  // of half the grid's side: a cell is 1/128 of the scene's extent
+constexpr int kStepsApart = 64;  // that mixed devices take between two looks at the first
+// in half sides of the grid: a cell is 1/128 of the scene's extent
+constexpr float kGridExtents = 4;
 
 SplatModel start_model(SplatModel start, const TrainOptions& options) {
     start.antialias = options.antialias;
@@ -249,7 +250,7 @@ gpu::DensifyArgs Trainer::round_args(int iteration) const {
     return args;
 }
 
-// Of devices that round differently: the splats of the first are everybody's again.
+// With devices that round differently, the splats of the first become everybody's again.
 void Trainer::follow_first() {
     const int opened = turns_.opened, controlled = turns_.controlled;
     const Bytes bytes =

@@ -65,10 +65,10 @@ class ViewOrder {
 struct IterationResult {
     int iteration = 0;  // from 1
     double loss = 0;
-    double psnr_db = 0;  // of the training view
+    double psnr_db = 0;  // for the training view
     std::uint32_t splats = 0, visible = 0, intersections = 0;
-    std::uint32_t pixels = 0;  // of the photo, at the size of now
-    int rest_floats = 0;       // of a splat's harmonics, as buffers hold them
+    std::uint32_t pixels = 0;  // the photo's, at its current size
+    int rest_floats = 0;       // a splat's harmonics, as buffers hold them
     bool ends_step = true;     // false: other views of its batch follow
 };
 
@@ -76,7 +76,7 @@ struct IterationResult {
 struct TrainingPicture {
     const ImageF& image;      // [H][W][3] as it is compared with the photo, not clamped
     const ImageU8& photo;     // [H][W][4], at the size that photos have now
-    const std::string& name;  // of the view
+    const std::string& name;  // the view's name
     int iteration = 0;        // that this is a step of, from 1
     glm::vec3 background{0.0f};
 };
@@ -188,7 +188,7 @@ class Trainer {
     OneRank alone_;
     RankGroup ranks_;
     Schedule schedule_;
-    double extent_;  // of the scene
+    double extent_;  // the scene's extent
     MemoryBudget memory_;
     GpuSplats splats_;
     TrainingPhotos photos_;
@@ -206,7 +206,7 @@ class Trainer {
     struct Turns {                           // the iterations after which these had theirs
         int opened = 0;                      // density control and probes
         int controlled = 0;                  // density control
-        std::optional<DensityResult> round;  // its result, still to be told
+        std::optional<DensityResult> round;  // its result, still to be reported
     } turns_;
     std::optional<GradientTree> tree_;         // steps_by_views()
     std::optional<CameraRefinement> cameras_;  // options.refine_cameras

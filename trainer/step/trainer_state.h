@@ -17,10 +17,10 @@ struct TrainCounters {
     std::uint64_t redone_iterations = 0, overflows = 0;  // an overflow redoes one or two iterations
     std::uint32_t longest_list = 0;        // intersections of one tile, most in any frame
     std::uint32_t huge_splats = 0;         // most in any frame
-    std::uint32_t most_intersections = 0;  // of splats and tiles, most in any frame
+    std::uint32_t most_intersections = 0;  // between splats and tiles, most in any frame
     std::uint64_t bad_gradients = 0;
     std::uint64_t cloned_or_split = 0, pruned = 0;  // where splats move: new, moved
-    std::uint32_t undrawn = 0;  // of the pruned: those that went after growth, as nothing drew them
+    std::uint32_t undrawn = 0;  // those of `pruned` that went after growth, as nothing drew them
     std::array<std::uint64_t, CULL_REASONS> culled{};  // summed over frames, by reason
 };
 

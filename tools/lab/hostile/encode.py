@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small valid pictures from nothing: PNG, JPEG (baseline and progressive) and lossless WebP, standard library alone."""
+"""Makes small valid pictures: PNG, JPEG (baseline and progressive) and lossless WebP, with the standard library alone."""
 
 import struct
 import zlib
@@ -32,13 +32,14 @@ def png(width, height, pixel, channels=3):
 
 
 def jpeg(width, height, pixel, progressive=False, components=3):
-    """Blocks of one value each. pixel(x, y) -> Y, Cb, Cr of the block's first pixel."""
+    """Blocks of one value each. pixel(x, y) -> Y, Cb, Cr of a block's first pixel."""
     def segment(marker, body):
         return bytes([0xff, marker]) + struct.pack(">H", len(body) + 2) + body
 
     ids = range(1, components + 1)
     frame = struct.pack(">BHHB", 8, height, width, components) + b"".join(bytes([i, 0x11, 0]) for i in ids)
-    dc_lengths = [2, 3, 3, 3, 3, 3, 4, 5, 6, 7, 8, 9]  # of the categories 0 to 11, as the standard's example
+    # lengths for the categories 0 to 11, as in the standard's example
+    dc_lengths = [2, 3, 3, 3, 3, 3, 4, 5, 6, 7, 8, 9]
     codes, code, last = [], 0, dc_lengths[0]
     for length in dc_lengths:
         code <<= length - last

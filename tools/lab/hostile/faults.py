@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Part 2: writes that fail, are short or interrupted at every call in turn, full and closed standard streams, a limit on
-the size of files. The error is said, earlier outputs stay whole, and the next run leaves nothing behind."""
+"""Part 2: writes that fail, are short or are interrupted at every call in turn; full and closed standard streams; a limit on
+file sizes. The error must be reported, earlier outputs must stay whole, and the next run must leave nothing behind."""
 
 import errno
 import json
@@ -14,7 +14,7 @@ import guard
 import samples
 
 WEIGHT = 3
-# command, what it writes over (sample -> path), whether it ends in a scene that repeats to the byte
+# command, what it overwrites (sample -> path), whether it ends in a scene that repeats to the byte
 COMMANDS = {
     "train": (["train", "in/colmap", "-o", "out/run", *samples.TRAIN], {}, "out/run"),
     "train again": (["train", "in/colmap", "-o", "out/run", *samples.TRAIN], {"run": "out/run"}, "out/run"),
@@ -35,7 +35,7 @@ COMMANDS = {
                  "--blending-views", "0"], {}, None),
 }
 ERRORS = [errno.ENOSPC, errno.EIO, errno.EDQUOT, errno.EROFS]
-LETTERS = "owsrcfm"  # of fault.c
+LETTERS = "owsrcfm"  # the letters of fault.c
 
 
 def library(day):
@@ -56,7 +56,7 @@ def set_up(case, name):
         case.take(sample, target)
     case.add_foreign()
     case.guard()
-    # What the run may replace; whether it is whole afterwards is check_outputs' to say.
+    # What the run may replace; check_outputs tests afterwards whether it is whole.
     case.owned |= {path for path in case.before if any(path == t or path.startswith(t + "/") for t in earlier.values())}
     return arguments, scene
 
@@ -70,7 +70,8 @@ def reference(case, name):
     """What the command leaves when nothing fails, and how often it makes each counted call."""
     known = case.day.store.get(("reference", name))
     if known is None:
-        other = guard.Case(case.day, case.part, -1)  # in the folder of the case itself, whose path some files hold
+        # in the folder of the case itself, because some files hold its path
+        other = guard.Case(case.day, case.part, -1)
         arguments, _ = set_up(other, name)
         trace = os.path.join(case.day.home, "trace")
         if os.path.exists(trace):
@@ -97,14 +98,14 @@ def preload(case, more):
 
 
 def is_whole(path):
-    """Of files that differ from run to run: they are complete."""
+    """For files that differ from run to run: checks that they are complete."""
     with open(path, "rb") as file:
         data = file.read()
     try:
         if path.endswith(".json"):
             json.loads(data)
         elif path.endswith(".jsonl"):
-            for line in data.split(b"\n")[:-1]:  # the last one may be cut
+            for line in data.split(b"\n")[:-1]:  # the last line may be cut
                 json.loads(line)
         elif path.endswith(".html"):
             return data.rstrip().endswith(b"</html>")
@@ -121,7 +122,7 @@ def is_whole(path):
 
 
 def check_outputs(case, old, new):
-    """Every earlier file is there as it was or as the whole run writes it; every other one is whole."""
+    """Every earlier file must be as it was or as the whole run writes it, and every other file must be whole."""
     after = outputs_of(case)
     for path, state in old.items():
         if path not in after and path in new and state not in after.values():
@@ -134,7 +135,7 @@ def check_outputs(case, old, new):
 
 
 def check_next(case, name, arguments, scene, new):
-    """The same command without a fault: succeeds, leaves no temporary file, and the scene is the same to the byte."""
+    """Runs the same command without a fault: it must succeed, leave no temporary file, and make the same scene to the byte."""
     if scene and "--resume" not in arguments and os.path.exists(case.path(scene, "checkpoint.darb")) and \
             case.random.random() < 0.5 and name == "train":
         arguments = [*arguments, "--resume"]
@@ -147,7 +148,7 @@ def check_next(case, name, arguments, scene, new):
 
 
 def choose_fault(case, calls):
-    """-> environment of the library, whether the command must succeed all the same, words."""
+    """-> environment for the library, whether the command must succeed all the same, a description."""
     rng = case.random
     letter = rng.choice([one for one in LETTERS if one in calls] or ["w"])
     first = rng.randrange(1, calls.count(letter) + 1) if letter in calls else 1
@@ -184,7 +185,7 @@ def one(case):
 
 
 def run_limited(case, arguments, limit):
-    """The streams go to /dev/null: as files they would reach the limit too."""
+    """The streams go to /dev/null, because as files they would reach the limit, too."""
     result = case.run(arguments, limits={resource.RLIMIT_FSIZE: limit}, shell=f"  # prlimit --fsize={limit}",
                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, judge=False)
     if result.code not in (0, 2):
@@ -204,7 +205,7 @@ def run_without_streams(case, name, arguments):
     if kind == "full":
         with open("/dev/full", "wb") as full:
             result = case.run(arguments, stdout=full, shell="  " + shell)
-        if result.code == 0 and name != "compare":  # which says nothing there with -q
+        if result.code == 0 and name != "compare":  # compare prints nothing there with -q
             case.problem("full standard output unnoticed", name)
     elif kind == "no reader":
         reader, writer = os.pipe()

@@ -10,7 +10,7 @@ import mutate
 
 WEIGHT = 3
 
-# command: (words that keep it short, positional arguments to choose from)
+# command: (options that keep it short, positional arguments to choose from)
 BASES = {
     "train": ("--iterations 4 | -q | -o out/run", ["in/colmap in/text in/frames in/bare"]),
     "eval": ("", ["in/run in/scenes/scene.ply in/scenes/scene.spz", "in/colmap in/frames"]),
@@ -27,7 +27,7 @@ BASES = {
     "devices": ("", []),
     "bench": ("--seconds 0 | --samples 1 | -q", ["no_such_case"]),
 }
-# Values that make a run long and nothing else: these are chosen from instead.
+# Options whose usual values only make a run long: these values are chosen instead.
 SHORT = {
     "--iterations": ["1", "2", "7"], "--steps": ["1", "9"], "--samples": ["1", "3"], "--cells": ["8", "20"], "--seeds": ["1", "2"],
     "--primitives": ["1", "3", "1,2"], "-N": ["1", "3"], "--seconds": ["0"], "--most-splats": ["1000"], "--fps": ["1", "30", "240"],
@@ -72,7 +72,7 @@ class Option:
         return rng.choice(self.names)
 
     def value(self, rng):
-        """One word, several for a list now and then, None for a switch."""
+        """One word; for lists sometimes several; None for a switch."""
         main = max(self.names, key=len)
         if not self.kind:
             return None
@@ -110,7 +110,7 @@ class Option:
 
 
 def options_of(day, command):
-    """As the help of the command lists them; what each takes, as the command says of one without its value."""
+    """The options in the command's help; what each takes is what the command says when the value is missing."""
     if ("options", command) in day.store:
         return day.store[("options", command)]
 
@@ -162,6 +162,6 @@ def one(case):
     case.run([command, *words])
     if "" in words or any(".." in word or word in (".", "mine/notes.txt") for word in words):
         case.owned |= {"mine/notes.txt"}
-    # Relative names from HOSTILE_TEXT are legal outputs: they lie in the working folder.
+    # Relative names from HOSTILE_TEXT are legal outputs, and lie in the working folder.
     values = [word.split("=")[-1] for word in words if word and "\0" not in word]
     case.check_kept([os.path.relpath(case.path(value), case.folder).split("/")[0] for value in values])

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Part 5: outputs onto inputs and into links, folders that cannot be written, two runs in one folder, FIFOs, devices and
-folders where a file is meant."""
+"""Part 5: outputs that are inputs or links, folders that cannot be written, two runs in one folder, FIFOs, devices and
+folders in place of files."""
 
 import os
 import socket
@@ -15,7 +15,7 @@ TRAIN = " ".join(samples.TRAIN)
 
 
 def spellings(rng, path):
-    """Other names of one file or folder, below the case's folder."""
+    """Other names for one file or folder, below the case's folder."""
     head, tail = os.path.split(path)
     return rng.choice([path, "./" + path, f"{head}/../{head}/{tail}" if head else f"./{tail}", path.replace("/", "//", 1),
                        "linked/" + tail if head == "in" else path])
@@ -30,7 +30,7 @@ def set_up(case, folder_link=True):
 
 
 def onto_inputs(case):
-    """Whatever an output is named, the input of the same command stays."""
+    """Whatever an output is called, the input of the same command must stay."""
     set_up(case)
     photo = "in/colmap/images/view_0.png"
     compare = "compare in/colmap --kernels gaussian --iterations 2 -q --blending-views 0"
@@ -65,7 +65,7 @@ def onto_inputs(case):
 
 
 def into_links(case):
-    """A link is followed or replaced; what it leads to beside the output stays."""
+    """A link is followed or replaced; other files where it leads must stay."""
     set_up(case)
     case.add_foreign()
     os.makedirs(case.path("elsewhere"))
@@ -73,7 +73,7 @@ def into_links(case):
     target = {"to folder": "elsewhere", "dangling": "elsewhere/none", "loop": "", "to file": "mine/notes.txt",
               "to device": "/dev/full"}[kind]
     case.what = f"output is a link {kind}"
-    for name in ("link", "link.ply"):  # the latter where the name tells the format
+    for name in ("link", "link.ply"):  # the second one for outputs whose name tells the format
         to = name if kind == "loop" else target if target.startswith("/") else case.path(target)
         os.symlink(to, case.path(name))
     line = case.random.choice(one_output("link"))
@@ -95,7 +95,7 @@ def one_output(path):
 
 
 def unwritable(case):
-    """Folders without the right to write, below a file, in /proc, names too long: an error, at once."""
+    """Folders that cannot be written, lie below a file or in /proc, or have names that are too long: an error at once."""
     set_up(case)
     case.write("a_file", "mine\n")
     os.makedirs(case.path("closed"))
@@ -126,7 +126,7 @@ def reachable(path):
 
 
 def two_at_once(case):
-    """Two runs into one folder: the one is refused, or both are whole."""
+    """Two runs into one folder: either one is refused, or both are whole."""
     set_up(case)
     line = case.random.choice([
         "train in/colmap -o out/run -q --iterations 600", f"train in/colmap -o out/run {TRAIN} --resume",
@@ -156,20 +156,20 @@ def two_at_once(case):
 
 
 def run_beside(case, line):
-    """As Case.run, with streams of its own."""
+    """The same as Case.run, with its own streams."""
     result = guard.run_bounded([case.day.darb, *line], case.folder, case.environment({}), streams=case.folder + ".other")
     case.judge(result, (0, 2))
     return result
 
 
 def overlapped(results):
-    """Whether the runs were both at work for most of their time: the second did not begin after the first."""
+    """Whether both runs were at work for most of their time, rather than one after the other."""
     starts, ends = [r.start for r in results], [r.start + r.wall for r in results]
     return min(ends) - max(starts) > 0.8 * min(r.wall for r in results)
 
 
 def no_files(case):
-    """FIFOs, sockets, devices and folders as inputs: an error, at once; none is waited for."""
+    """FIFOs, sockets, devices and folders as inputs: an error at once, without waiting for any of them."""
     set_up(case)
     os.mkfifo(case.path("pipe"))
     with socket.socket(socket.AF_UNIX) as plug:

@@ -14,13 +14,13 @@ import stat
 import subprocess
 import time
 
-WALL_LIMIT = 120  # s; longer where the processor is what it waits for, as a run at idle priority may for long
-CPU_LIMIT = 40  # s of a command; the longest here takes 2
+WALL_LIMIT = 120  # s; longer where it waits for the processor, as a run at idle priority may for long
+CPU_LIMIT = 40  # s per command; the longest here takes 2
 MEMORY_LIMIT = 1 << 30  # bytes resident
 DATA_LIMIT = 8 << 30  # bytes of RLIMIT_DATA, so that a runaway ends before the machine does
 FILE_LIMIT = 1 << 30  # bytes of RLIMIT_FSIZE
 
-# What a terminal acts on: C0 but for tab and newline, DEL, C1, and marks that turn the direction of text.
+# What a terminal acts on: C0 except tab and newline, DEL, C1, and marks that change the direction of text.
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
 
@@ -55,7 +55,7 @@ def snapshot(root):
 
 
 def wants_processor(pid):
-    """Whether a thread of it could run, in one of ten looks a tenth of a second apart."""
+    """Whether one of the process's threads could run, in one of ten looks a tenth of a second apart."""
     for _ in range(10):
         try:
             for thread in os.listdir(f"/proc/{pid}/task"):
@@ -69,8 +69,8 @@ def wants_processor(pid):
 
 
 def run_bounded(command, cwd, environment, **options):
-    """options: stdin, stdout, stderr as Popen has them; limits {resource: value}; poke(process) is called once it runs;
-    user: as whom to run; streams: where the text of both goes."""
+    """options: stdin, stdout, stderr as for Popen; limits {resource: value}; poke(process) is called once it runs; user: the user
+    to run as; streams: where the text of both goes."""
     streams = options.get("streams", cwd)
     out_path, err_path = streams + ".stdout", streams + ".stderr"
     limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_CPU: CPU_LIMIT, resource.RLIMIT_DATA: DATA_LIMIT,
@@ -119,9 +119,9 @@ class Case:
         self.folder = os.path.join(day.work, part)
         shutil.rmtree(self.folder, ignore_errors=True)
         os.makedirs(self.folder)
-        self.what = ""  # of the case, a line for the summary
+        self.what = ""  # what the case is, a line for the summary
         self.commands, self.problems, self.runs = [], [], 0
-        self.owned = set()  # paths that darb may change: it wrote them
+        self.owned = set()  # paths that darb may change, because it wrote them
         self.before = {}
 
     def path(self, *names):
@@ -137,13 +137,13 @@ class Case:
             return file.read()
 
     def take(self, sample, name):
-        """Copies a sample, file or folder, to in/NAME or wherever name says."""
+        """Copies a sample, a file or folder, to in/NAME or to where `name` says."""
         source, target = os.path.join(self.day.samples, sample), self.path(name)
         os.makedirs(os.path.dirname(target), exist_ok=True)
         shutil.copytree(source, target, symlinks=True) if os.path.isdir(source) else shutil.copyfile(source, target)
 
     def add_foreign(self, folders=("mine", "out")):
-        """What a user may have lying about: nothing of it may change."""
+        """Files that a user may have around; none of them may change."""
         for folder in folders:
             self.write(f"{folder}/notes.txt", "mine\n")
             self.write(f"{folder}/frame_note.png", "mine too\n")
@@ -154,7 +154,7 @@ class Case:
                 os.mkfifo(self.path(folder, "pipe"))
 
     def guard(self):
-        """From here on, what is there now must stay as it is, but for `owned`."""
+        """From here on, everything that exists must stay as it is, except `owned`."""
         self.before = snapshot(self.folder)
 
     def environment(self, extra):
@@ -162,13 +162,13 @@ class Case:
         return {**keep, "HOME": self.day.home, "XDG_CACHE_HOME": os.path.join(self.day.home, "cache"), **extra}
 
     def run(self, arguments, allowed=(0, 2), extra=None, names=(), judge=True, **options):
-        """Runs darb; names: of which the text of an error must hold one."""
+        """Runs darb. names: the text of an error must hold one of them."""
         self.runs += 1
         words = [f"{k}={v}" for k, v in (extra or {}).items()]
         self.commands.append(shlex.join(words + ["darb", *arguments]) + options.pop("shell", ""))
         try:
             result = run_bounded([self.day.darb, *arguments], self.folder, self.environment(extra or {}), **options)
-        except (ValueError, OSError) as error:  # an argument that exec cannot take, as one with a zero byte
+        except (ValueError, OSError) as error:  # an argument that exec cannot pass, such as one with a zero byte
             return Result(2, "", f"error: {error}", 0, 0, 0, 0, False)
         if judge:
             self.judge(result, allowed, names)
@@ -196,7 +196,7 @@ class Case:
                 self.problem("control characters", f"{stream} has {found.group()!r}: {at!r}")
 
     def check_kept(self, outputs=()):
-        """Nothing that was there at guard() went or changed, nothing new lies outside out/ and `outputs`, and no
+        """Checks that nothing from before guard() is missing or changed, nothing new lies outside out/ and `outputs`, and no
         temporary file is left."""
         after = snapshot(self.folder)
         for path, was in self.before.items():

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Part 3: SIGKILL, SIGTERM, SIGINT and SIGHUP at random moments of short trainings; each is resumed, and ends in the
-scene of a run that nobody ended, to the byte. No signal but SIGKILL loses what was trained so far."""
+"""Part 3: SIGKILL, SIGTERM, SIGINT and SIGHUP at random moments of short trainings. Each is resumed and must end in the same
+scene, to the byte, as a run that nobody ended. No signal but SIGKILL may lose what was trained so far."""
 
 import os
 import signal
@@ -25,7 +25,7 @@ def scene_folder():
 
 
 def whole(case, variant):
-    """The scenes and the seconds of a run that nobody ends."""
+    """The scenes of a run that nobody ends, and its seconds."""
     key = ("whole", tuple(variant))
     if key not in case.day.store:
         other = guard.Case(case.day, "kills_whole", 0)
@@ -69,12 +69,13 @@ def resume(case):
 
 
 def end_at(case, variant, which, moment, twice):
-    """Whether the signal met the run before its end."""
+    """Whether the signal reached the run before its end."""
     def poke(process):
         def strike():
             for _ in range(2 if twice else 1):
                 try:
-                    os.kill(process.pid, which)  # not waited for before the timer is cancelled: still this process
+                    # not waited for before the timer is cancelled, so it is still this process
+                    os.kill(process.pid, which)
                 except ProcessLookupError:
                     return
         timer = threading.Timer(moment, strike)
@@ -93,7 +94,7 @@ def end_at(case, variant, which, moment, twice):
     case.day.counts["of them with a checkpoint to resume"] += bool(resume(case))
     started = begun or os.path.exists(case.path("out/run.jsonl"))
     if result.timed_out or result.code not in SIGNALS[which]:
-        # Before the handler is there, a signal ends the program as it ends any; so may a second one.
+        # Before its handler is installed, a signal ends the program as it ends any other; so may a second signal.
         if not (result.code == -which and (twice or moment < 0.5 or not started)):
             case.problem(f"{which.name} ends with {result.code}", result.last_words())
     if which != signal.SIGKILL and result.code >= 0 and started and not resume(case):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Runs hostile cases for a while and writes what they found: hostile.json and hostile.txt, with the command that repeats
-each finding and its files.
+"""Runs hostile cases for a while and writes what they found to hostile.json and hostile.txt, with the command that repeats
+each finding, and its files.
 
-Each case is a fresh folder, made from the seed, the part and the case's number alone: a finding repeats with
+Each case is a fresh folder, made only from the seed, the part and the case's number, so that a finding can be repeated:
     tools/lab/hostile.sh --only PART --seed N --case NUMBER
 A command must end with its documented exit codes, within bounds of time and memory, name the file in its error, send
-nothing to the terminal that acts there, and leave inputs and files of the user as they are.
+nothing to the terminal that the terminal acts on, and leave inputs and files of the user as they are.
 """
 
 import argparse
@@ -26,7 +26,7 @@ import samples  # noqa: E402
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
 PARTS = ["mutations", "faults", "kills", "flags", "folders", "pages"]
-KEEP = 3  # cases whose files are kept, of one finding
+KEEP = 3  # how many cases of one finding keep their files
 
 
 class Day:
@@ -63,7 +63,7 @@ class Day:
                 found["kept"].append(self.keep(case, kind))
 
     def keep(self, case, kind):
-        """Copies the case's files aside, with the lines that repeat it."""
+        """Copies the case's files aside, with the command lines that repeat it."""
         name = f"{case.part}_{case.number}_{re.sub('[^a-zA-Z0-9]+', '_', kind)}"
         target = os.path.join(self.out, "findings", name)
         shutil.rmtree(target, ignore_errors=True)
@@ -90,13 +90,13 @@ class Day:
 
 
 def signature(text):
-    """Of a finding's text what does not change from case to case."""
+    """The part of a finding's text that does not change from case to case."""
     text = re.sub(r"'[^']*'|\"[^\"]*\"", "Q", text)
     return re.sub(r"[\w./-]*/[\w./-]*|-?\d[\d.e+-]*|\S*\\\S*", "N", text)[:60]
 
 
 def commit():
-    """Empty where there is no git, or no repository."""
+    """Empty where there is no git or no repository."""
     if not shutil.which("git"):
         return ""
     return subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False).stdout.strip()
@@ -135,7 +135,7 @@ def write_summary(day, begin, hours):
 
 
 def spend(day, hours, parts):
-    """Cases of the part that had the least of its share so far, until the time is over; each part at least once."""
+    """Runs cases of the part that has had the least of its share, until the time is over; each part at least once."""
     begin, number = time.time(), collections.Counter()
     weights = {part: importlib.import_module(part).WEIGHT for part in parts}
     written = begin
@@ -166,7 +166,7 @@ def main():
         parser.error("give HOURS, or --only PART --case N")
     darb = os.path.abspath(os.environ.get("DARB", os.path.join(ROOT, "build", "darb")))
     if not os.access(darb, os.X_OK):
-        sys.exit(f"{darb} is not there: build it, or name it in DARB")
+        sys.exit(f"{darb} does not exist: build it, or name it in DARB")
     out = os.path.abspath(options.out or tempfile.mkdtemp(prefix="hostile_"))
     os.makedirs(out, exist_ok=True)
     day = Day(darb, out, options.seed)

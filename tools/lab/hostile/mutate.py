@@ -24,7 +24,7 @@ HOSTILE_JSON = [
 
 
 def numbers(rng):
-    """Bytes of a number that readers may trip over."""
+    """The bytes of a number that may trip readers."""
     if rng.random() < 0.5:
         value = rng.choice([0, 1, 2**31 - 1, 2**31, 2**32 - 1, 2**32, 2**63 - 1, 2**63, 2**64 - 1, 10**6, 10**9, 10**12])
         size = rng.choice([1, 2, 4, 8])
@@ -114,7 +114,7 @@ def _nodes(value, path=()):
 
 
 def damage_json(data, rng):
-    """A value of the wrong type or size, a key less, a hostile name; in JSON lines, of one line."""
+    """A value of the wrong type or size, a missing key, or a hostile name; in JSON lines, in one line."""
     text = data.decode("utf-8", "surrogateescape")
     lines = text.splitlines() if "\n{" in text and not text.startswith(("[", "{\n")) else [text]
     line = rng.randrange(len(lines))

@@ -64,7 +64,7 @@ def data_folder(file):
 
 
 def damage(case, file):
-    """The damaged bytes of the sample; a checksummed one mostly by one bit."""
+    """The damaged bytes of the sample; where there is a checksum, mostly one flipped bit."""
     with open(os.path.join(case.day.samples, file), "rb") as handle:
         data = handle.read()
     extension = os.path.splitext(file)[1]
@@ -111,7 +111,7 @@ def one(case):
 
 
 def check_same_splats(case, file):
-    """A flipped bit under a checksum: refused, or without effect."""
+    """A flipped bit under a checksum must be refused or have no effect."""
     case.take(file, f"whole/{os.path.basename(file)}")
     case.run(["convert", f"whole/{os.path.basename(file)}", "whole/a.ply"])
     if not filecmp.cmp(case.path("whole/a.ply"), case.path("out/a.ply"), shallow=False):

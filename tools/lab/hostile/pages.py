@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Part 6: reports of data sets with hostile names hold no markup of theirs, and cfg_args no code."""
+"""Part 6: reports of data sets with hostile names must hold no markup from these, and cfg_args no code."""
 
 import ast
 import html.parser
@@ -20,11 +20,11 @@ HARMLESS = set("p li ul td tr th span div details summary code figure g line tex
 
 
 class Outline(html.parser.HTMLParser):
-    """The elements of a page with their attributes' names; what may run or load."""
+    """The elements of a page with the names of their attributes, and what may run or load."""
 
     def __init__(self, known=frozenset()):
         super().__init__(convert_charrefs=True)
-        self.known = known  # elements that we write
+        self.known = known  # the elements that darb writes
         self.elements, self.suspicious, self.scripts, self.in_script = set(), [], 0, False
 
     def handle_starttag(self, tag, attributes):
@@ -62,7 +62,7 @@ def outline(path, known=frozenset()):
 
 
 def hostile_name(rng):
-    """A file's name, at most 200 bytes."""
+    """A file name of at most 200 bytes."""
     name = "".join(rng.choice(mutate.HOSTILE_TEXT) for _ in range(rng.randrange(1, 3)))
     name = name.replace("/", rng.choice(["", "∕"])).replace("\0", "").replace("\n", rng.choice(["\n", ""]))
     name = MARK + name.encode("utf-8", "surrogateescape")[:150].decode("utf-8", "ignore")
@@ -131,7 +131,7 @@ def check_page(case, path, plain):
 
 
 def check_cfg_args(case, path):
-    """One call of Namespace with constants, as 3DGS's tools evaluate it."""
+    """cfg_args must be one call of Namespace with constants, because 3DGS's tools evaluate it."""
     if not os.path.exists(path):
         return
     with open(path, encoding="utf-8", errors="surrogateescape") as file:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The valid inputs that the parts start from: data sets of four small photos, written here, and what darb makes of them."""
+"""The valid inputs from which the parts start: data sets of four small photos, written here, and what darb makes of them."""
 
 import gzip
 import io
@@ -107,7 +107,7 @@ def sog():
             "scales": {"codebook": book, "files": ["s"]}, "quats": {"files": ["q"]},
             "sh0": {"codebook": book, "files": ["c"]}}
     archive = io.BytesIO()
-    # quats: alpha 255 says that the last component is the largest
+    # quats: alpha 255 means that the last component is the largest
     files = {"meta.json": json.dumps(meta).encode(), "l": picture(3), "u": picture(7), "s": picture(1, 16),
              "q": picture(5), "c": picture(1, 16)}
     with zipfile.ZipFile(archive, "w") as zip_file:
@@ -145,7 +145,7 @@ TRAIN = ["--iterations", "6", "--checkpoint-interval", "2", "--densify-from-iter
 
 
 def make_half(folder, run):
-    """A run as a kill after its fourth iteration leaves it: what --resume goes on from."""
+    """A run as a kill after its fourth iteration leaves it, from which --resume goes on."""
     run(["train", "colmap", "-o", "half", *TRAIN, "--checkpoint-iterations", "4"])
     os.replace(f"{folder}/half/chkpnt4.darb", f"{folder}/half/checkpoint.darb")
     shutil.rmtree(f"{folder}/half/point_cloud")
@@ -154,7 +154,7 @@ def make_half(folder, run):
 
 
 def make(folder, run):
-    """All of them in `folder`; run(arguments) runs darb there and must succeed."""
+    """Makes all of them in `folder`; run(arguments) runs darb there and must succeed."""
     for name in ("colmap", "text", "frames", "bare"):
         write_photos(f"{folder}/{name}/images")
         write_masks(f"{folder}/{name}/masks")
