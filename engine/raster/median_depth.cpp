@@ -91,18 +91,18 @@ void MedianDepth::record(Commands& commands, const GpuSplats& splats, const Fram
             g.x, g.y);
     }
     commands.pass("median depth");
-    const auto walk = [&](const Pipeline& pipeline, bool last) {
+    const auto walk = [&](const Pipeline& pipeline) {
         for (std::uint32_t segment = 0; segment < segments; ++segment)
             commands.dispatch(
                 pipeline,
                 gpu::MedianDepthArgs{camera.width, camera.height, camera.tiles_x, level,
-                                     camera.near_plane, segment, segments, last ? 1u : 0u},
+                                     camera.near_plane, segment, segments},
                 {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape,
                  s.light, s.bound, s.exponent, planes_, bracket_, list_end_, product_, depth_},
                 camera.tiles_x, camera.tiles_y, kBlocksOfTile);
     };
-    walk(bracket_pass_, false);
-    for (std::uint32_t w = 0; w < MEDIAN_WALKS; ++w) walk(walk_, w + 1 == MEDIAN_WALKS);
+    walk(bracket_pass_);
+    for (std::uint32_t w = 0; w < MEDIAN_WALKS; ++w) walk(walk_);
 }
 
 }  // namespace darb

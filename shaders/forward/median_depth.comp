@@ -42,6 +42,9 @@ layout(set = 0, binding = 11, scalar) buffer DepthOut { vec2 depth_out[]; };  //
 #include "lib/pixel_slot.glsl"
 
 const float NO_EDGE = 3e38;
+const float UNKNOWN = -1.0;  // T at the end of the bracket, until a walk has tested it
+// Where a walk is the last of a pixel: T is straight between the ends, or float32 holds no more between them.
+const float STRAIGHT = 1e-3, STRAIGHT_FALL = 0.01, LEAST_STEP = 1e-5;  // of the depth; of the light; of the depth
 
 // A splat on the ray of a pixel.
 struct Slice {
@@ -118,7 +121,9 @@ void find_bracket(uvec2 range, uint first, uint bits, uint pixel, vec2 centre) {
         const float left = abs(state.x);
         depth_out[pixel] = vec2(0.0, 1.0 - left);
         const float low = max(state.y, args.near_plane);
-        state = left <= args.level ? vec4(low, max(state.z, low), 1.0, args.level) : vec4(1.0, 0.0, 1.0, 1.0);
+        const float high = max(state.z, low);
+        if (left <= args.level) depth_out[pixel].x = high;
+        state = left <= args.level ? vec4(low, high, 1.0, UNKNOWN) : vec4(1.0, 0.0, 1.0, 1.0);
     }
     bracket[pixel] = state;
     list_end[pixel] = end;
@@ -149,9 +154,14 @@ vec4 narrowed(vec4 b, float step, float left[MEDIAN_SAMPLES]) {
     return vec4(b.x + float(MEDIAN_SAMPLES) * step, b.y, below, b.w);
 }
 
+bool is_found(vec4 b) {
+    const float width = b.y - b.x;
+    return width <= LEAST_STEP * b.y || (width <= STRAIGHT * b.y && b.z - b.w <= STRAIGHT_FALL);
+}
+
 void search(uvec2 range, uint bits, uint pixel, vec2 centre) {
     const vec4 b = bracket[pixel];
-    if (b.y < b.x) return;
+    if (b.y < b.x || is_found(b)) return;
     const float step = (b.y - b.x) / float(MEDIAN_SAMPLES + 1u);
     const uint plane = args.width * args.height;
     float left[MEDIAN_SAMPLES];
@@ -163,9 +173,8 @@ void search(uvec2 range, uint bits, uint pixel, vec2 centre) {
     }
     const vec4 rest = narrowed(b, step, left);
     bracket[pixel] = rest;
-    if (args.last_walk == 0u) return;
     const float fall = rest.z - rest.w;
-    const float share = fall > 0.0 ? clamp((rest.z - args.level) / fall, 0.0, 1.0) : 1.0;
+    const float share = fall > 0.0 && rest.w >= 0.0 ? clamp((rest.z - args.level) / fall, 0.0, 1.0) : 1.0;
     depth_out[pixel].x = mix(rest.x, rest.y, share);
 }
 

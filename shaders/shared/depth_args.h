@@ -11,7 +11,7 @@
 #define DEPTH_READING_PLANE 2  // all at once, in the plane of its middle
 
 #define MEDIAN_SAMPLES 8u  // depths that one walk over a list tests
-#define MEDIAN_WALKS 5u    // each leaves a ninth of the bracket
+#define MEDIAN_WALKS 5u    // at most; each leaves a ninth of the bracket
 // Intersections of a tile's list that a dispatch takes: with the loop over the samples a third of
 // the rounds that LIST_SEGMENT leaves a driver.
 #define MEDIAN_SEGMENT 2048u
@@ -33,12 +33,11 @@ struct MedianDepthArgs {
     float near_plane;  // world units along z: no surface is before it
     uint segment;      // which MEDIAN_SEGMENT of every list this dispatch takes
     uint segments;     // in all
-    uint last_walk;    // 1: this walk's result is the depth
 };
 
 #ifdef __cplusplus
 static_assert(sizeof(DepthPlaneArgs) == 12);
-static_assert(sizeof(MedianDepthArgs) == 32);
+static_assert(sizeof(MedianDepthArgs) == 28);
 }  // namespace darb::gpu
 #endif
 #endif
