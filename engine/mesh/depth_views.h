@@ -19,7 +19,7 @@ namespace darb {
 using MeshProgress = std::function<void(const char* what, double share)>;
 
 struct DepthView {
-    Camera camera;                      // a pinhole; relative to SplatModel::origin as the model is
+    Camera camera;                      // a pinhole, in the world
     std::vector<float> depth;           // [H][W] along the optical axis, world units; 0: no surface
     std::vector<std::uint32_t> colour;  // [H][W] RGBA, 8 bits each, red lowest; empty: not asked for
 };

@@ -102,6 +102,10 @@ PixelSize parse_size(const std::string& text);
 
 // Numbers and values of a command line, typed or kept by a run.
 
+/// `count` finite numbers with commas between them. Throws Error naming the option.
+std::vector<double> numbers_from(const std::string& option, const std::string& text,
+                                 std::size_t count);
+
 /// Throws Error for an option whose value is "": it would count as not given.
 void refuse_empty_values(const std::vector<std::string>& arguments);
 
