@@ -75,9 +75,8 @@ std::vector<DepthView> render_depth_views(Renderer& renderer, const std::vector<
         DepthView view;
         view.camera = camera;
         view.camera.lens = {};
-        const ImageF picture =
-            renderer.render(view.camera, glm::vec3(0.0f), options.colours ? -1 : 0,
-                            options.near_plane);
+        const ImageF picture = renderer.render(view.camera, glm::vec3(0.0f),
+                                               options.colours ? -1 : 0, options.near_plane);
         if (options.colours)
             for (std::size_t p = 0; p < picture.data.size(); p += 3)
                 view.colour.push_back(packed_colour(&picture.data[p]));
@@ -128,8 +127,7 @@ ConfirmedDepths keep_confirmed(Device& device, std::vector<DepthView>& views,
         const Groups g = groups_for(pixels_of(views[v]), MESH_GROUP);
         commands.begin();
         commands.pass("agree");
-        commands.dispatch(agree,
-                          gpu::AgreeArgs{static_cast<std::uint32_t>(others[v].size()), 2},
+        commands.dispatch(agree, gpu::AgreeArgs{static_cast<std::uint32_t>(others[v].size()), 2},
                           {batch.views(), batch.depths(), kept}, g.x, g.y);
         commands.submit_and_wait();
         confirmed[v] = kept.download<float>(pixels_of(views[v]));

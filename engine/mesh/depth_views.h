@@ -19,9 +19,10 @@ namespace darb {
 using MeshProgress = std::function<void(const char* what, double share)>;
 
 struct DepthView {
-    Camera camera;                      // a pinhole, in the world
-    std::vector<float> depth;           // [H][W] along the optical axis, world units; 0: no surface
-    std::vector<std::uint32_t> colour;  // [H][W] RGBA, 8 bits each, red lowest; empty: not asked for
+    Camera camera;             // a pinhole, in the world
+    std::vector<float> depth;  // [H][W] along the optical axis, world units; 0: no surface
+    std::vector<std::uint32_t>
+        colour;  // [H][W] RGBA, 8 bits each, red lowest; empty: not asked for
 };
 
 struct DepthViewOptions {

@@ -25,9 +25,9 @@ namespace darb {
 
 namespace {
 
-constexpr int kAxisBits = 21;                         // of a Morton key
+constexpr int kAxisBits = 21;  // of a Morton key
 constexpr std::int64_t kAxisHalf = 1 << (kAxisBits - 1);
-constexpr double kLargestPixel = 8;                   // voxels
+constexpr double kLargestPixel = 8;  // voxels
 constexpr double kFarthestMedians = 4;
 // What a block of the surface leaves on the host in the usual case: vertices, their names, faces.
 constexpr double kHostBytesOfBlock = 40e3;
@@ -59,8 +59,8 @@ std::uint64_t morton_of(const BlockPlace& place) {
 BlockPlace place_of(std::uint64_t key) {
     BlockPlace place;
     for (unsigned a = 0; a < 3; ++a)
-        place[a] = static_cast<std::int32_t>(
-            static_cast<std::int64_t>(gathered_bits(key >> a)) - kAxisHalf);
+        place[a] = static_cast<std::int32_t>(static_cast<std::int64_t>(gathered_bits(key >> a)) -
+                                             kAxisHalf);
     return place;
 }
 
@@ -129,8 +129,8 @@ bool holds(const WorldBox& box, const glm::dvec3& p) {
     return glm::all(glm::greaterThanEqual(p, box.low)) && glm::all(glm::lessThanEqual(p, box.high));
 }
 
-void add_blocks_of_view(const DepthView& view, const TsdfOptions& options,
-                        const glm::dvec3& origin, KeySet& keys) {
+void add_blocks_of_view(const DepthView& view, const TsdfOptions& options, const glm::dvec3& origin,
+                        KeySet& keys) {
     const Camera& c = view.camera;
     const glm::dmat3 to_world = glm::transpose(c.rotation);
     const glm::dvec3 centre = c.centre() - origin;
@@ -167,9 +167,8 @@ class BlockIndex {
     std::uint32_t find(const BlockPlace& place) const {
         const std::uint64_t key = morton_of(place);
         const auto at = std::ranges::lower_bound(keys_, key);
-        return at != keys_.end() && *at == key
-                   ? static_cast<std::uint32_t>(at - keys_.begin())
-                   : NO_BLOCK;
+        return at != keys_.end() && *at == key ? static_cast<std::uint32_t>(at - keys_.begin())
+                                               : NO_BLOCK;
     }
     std::uint32_t beside(std::uint32_t block, unsigned bits) const {
         BlockPlace place = places_[block];
@@ -303,15 +302,14 @@ void RangeFusion::integrate(std::uint32_t blocks) {
                                       static_cast<float>(options_.voxel),
                                       static_cast<float>(options_.voxel * options_.truncation),
                                       static_cast<float>(options_.farthest)};
-        commands_.dispatch(integrate_, args, {batch_.views(), batch_.depths(), places_, sums_},
-                           g.x, g.y);
+        commands_.dispatch(integrate_, args, {batch_.views(), batch_.depths(), places_, sums_}, g.x,
+                           g.y);
         commands_.submit_and_wait();
         first = end;
     }
 }
 
-gpu::SurfaceArgs RangeFusion::count(const BlockRange& range,
-                                    std::array<std::uint32_t, 2>& totals) {
+gpu::SurfaceArgs RangeFusion::count(const BlockRange& range, std::array<std::uint32_t, 2>& totals) {
     const auto blocks = static_cast<std::uint32_t>(range.blocks.size());
     const gpu::SurfaceArgs args{blocks, range.own, static_cast<float>(options_.voxel)};
     const Groups g = groups_for(std::uint64_t{blocks} * BLOCK_VOXELS, MESH_GROUP);
@@ -341,10 +339,10 @@ bool RangeFusion::emit(const BlockRange& range, const gpu::SurfaceArgs& args,
     const Groups g = groups_for(std::uint64_t{args.blocks} * BLOCK_VOXELS, MESH_GROUP);
     commands_.begin();
     commands_.pass("surface emit");
-    commands_.dispatch(emit_, args,
-                       {sums_, neighbours_, edges_, vertex_at_, face_at_, places_, vertices, names,
-                        faces},
-                       g.x, g.y);
+    commands_.dispatch(
+        emit_, args,
+        {sums_, neighbours_, edges_, vertex_at_, face_at_, places_, vertices, names, faces}, g.x,
+        g.y);
     commands_.submit_and_wait();
     const auto base = static_cast<std::uint32_t>(to.vertices.size());
     const auto points = vertices.download<glm::vec3>(vertex_total);
@@ -372,8 +370,8 @@ bool RangeFusion::add(const BlockRange& range, RawSurface& to) {
 // The largest range from `first` on that fits with its shell; at least a block.
 BlockRange fitting_range(const BlockIndex& index, std::uint32_t first, std::uint32_t most,
                          std::uint32_t capacity) {
-    auto own = static_cast<std::uint32_t>(
-        std::min<std::size_t>({index.size() - first, most, capacity}));
+    auto own =
+        static_cast<std::uint32_t>(std::min<std::size_t>({index.size() - first, most, capacity}));
     for (;;) {
         BlockRange range = index.range(first, own);
         if (range.blocks.size() <= capacity || own == 1) return range;
@@ -544,12 +542,11 @@ void bake_colours(Device& device, const std::vector<DepthView>& views, TriangleM
             const Groups g = groups_for(count, MESH_GROUP);
             commands.begin();
             commands.pass("bake");
-            commands.dispatch(bake,
-                              gpu::BakeArgs{static_cast<std::uint32_t>(count),
-                                            static_cast<std::uint32_t>(end - v),
-                                            static_cast<float>(2 * voxel)},
-                              {batch.views(), batch.depths(), batch.colours(), vertices, sums}, g.x,
-                              g.y);
+            commands.dispatch(
+                bake,
+                gpu::BakeArgs{static_cast<std::uint32_t>(count),
+                              static_cast<std::uint32_t>(end - v), static_cast<float>(2 * voxel)},
+                {batch.views(), batch.depths(), batch.colours(), vertices, sums}, g.x, g.y);
             commands.submit_and_wait();
             v = end;
         }

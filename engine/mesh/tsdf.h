@@ -22,10 +22,10 @@ struct WorldBox {
 };
 
 struct TsdfOptions {
-    double voxel = 0;                // side, world units; 0: a pixel on the surface, in the median
-    int truncation = 4;              // half width of the band, voxels; 2 to 16
-    double farthest = 0;             // depths beyond it do not count; 0: 4 times the median depth
-    std::optional<WorldBox> bounds = {};  // what lies outside is left out
+    double voxel = 0;     // side, world units; 0: a pixel on the surface, in the median
+    int truncation = 4;   // half width of the band, voxels; 2 to 16
+    double farthest = 0;  // depths beyond it do not count; 0: 4 times the median depth
+    std::optional<WorldBox> bounds = {};       // what lies outside is left out
     std::uint64_t working_bytes = 512u << 20;  // device memory of a range of blocks and its views
 };
 

@@ -29,6 +29,10 @@ std::optional<DepthReading> depth_reading_from_name(std::string_view name) {
     return std::nullopt;
 }
 
+DepthReading usual_reading(int kernel) {
+    return kernel_pulses(kernel) > 1 ? DepthReading::plane : DepthReading::front;
+}
+
 MedianDepth::MedianDepth(Device& device, const ForwardOptions& options, DepthReading reading)
     : device_(&device) {
     DARB_CHECK(reading != DepthReading::expected);

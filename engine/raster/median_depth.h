@@ -28,6 +28,10 @@ inline constexpr std::string_view kDepthReadings[] = {"front", "solid", "plane",
 /// Nothing where there is no such reading.
 std::optional<DepthReading> depth_reading_from_name(std::string_view name);
 
+/// What depths are read by where nobody says how: `front`, or `plane` where the kernel's rings rise
+/// again along a ray.
+DepthReading usual_reading(int kernel);
+
 class MedianDepth {
   public:
     /// options: those of the frames. reading: any but `expected`. Throws Error where the kernel

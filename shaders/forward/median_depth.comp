@@ -44,7 +44,7 @@ layout(set = 0, binding = 11, scalar) buffer DepthOut { vec2 depth_out[]; };  //
 const float NO_EDGE = 3e38;
 const float UNKNOWN = -1.0;  // T at the end of the bracket, until a walk has tested it
 // Where a walk is the last of a pixel: T is straight between the ends, or float32 holds no more between them.
-const float STRAIGHT = 1e-3, STRAIGHT_FALL = 0.01, LEAST_STEP = 1e-5;  // of the depth; of the light; of the depth
+const float STRAIGHT = 1e-3, STRAIGHT_FALL = 4e-4, LEAST_STEP = 1e-5;  // of the depth; of the light; of the depth
 
 // A splat on the ray of a pixel.
 struct Slice {

@@ -28,8 +28,7 @@ double signed_distance(Solid solid, const glm::dvec3& p) {
         return glm::length(glm::dvec2(glm::length(glm::dvec2(p.x, p.z)) - kRingRadius, p.y)) -
                kTubeRadius;
     const glm::dvec3 over = glm::abs(p) - kHalfSide;
-    return glm::length(glm::max(over, 0.0)) +
-           std::min(std::max({over.x, over.y, over.z}), 0.0);
+    return glm::length(glm::max(over, 0.0)) + std::min(std::max({over.x, over.y, over.z}), 0.0);
 }
 
 struct SurfacePoint {
@@ -108,8 +107,8 @@ std::vector<Camera> cameras_around(int count, double distance, int size) {
     const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
     for (int i = 0; i < count; ++i) {
         const double y = 1 - (2.0 * i + 1) / count, r = std::sqrt(1 - y * y);
-        const glm::dvec3 from = distance * glm::dvec3(r * std::cos(golden * i), y,
-                                                      r * std::sin(golden * i));
+        const glm::dvec3 from =
+            distance * glm::dvec3(r * std::cos(golden * i), y, r * std::sin(golden * i));
         const glm::dvec3 forward = -glm::normalize(from);
         const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0.1, 1, 0.05), forward));
         const glm::dvec3 down = glm::cross(forward, right);
@@ -193,12 +192,11 @@ std::vector<std::tuple<int, Solid>> kernels_and_solids() {
     return cases;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Kernels, SurfaceOf, testing::ValuesIn(kernels_and_solids()),
-    [](const auto& given) {
-        return std::string(kernel_name(std::get<0>(given.param))) + "_" +
-               kSolidNames[int(std::get<1>(given.param))];
-    });
+INSTANTIATE_TEST_SUITE_P(Kernels, SurfaceOf, testing::ValuesIn(kernels_and_solids()),
+                         [](const auto& given) {
+                             return std::string(kernel_name(std::get<0>(given.param))) + "_" +
+                                    kSolidNames[int(std::get<1>(given.param))];
+                         });
 
 TEST(Surface, has_the_same_bits_in_ranges_and_again) {
     const SplatModel model = splats_on(Solid::ring, KERNEL_GAUSSIAN, kSpacing);
@@ -245,8 +243,8 @@ TEST(Surface, is_cut_to_its_bounds) {
     const auto views = views_of(model);
     const WorldBox box{glm::dvec3(-2, -0.3, -2), glm::dvec3(2, 2, 2)};
     TsdfReport report;
-    const TriangleMesh mesh = fuse_depths(shared_device(), views, model.origin,
-                                          {.voxel = kVoxel, .bounds = box}, report);
+    const TriangleMesh mesh =
+        fuse_depths(shared_device(), views, model.origin, {.voxel = kVoxel, .bounds = box}, report);
     EXPECT_FALSE(is_closed(mesh));
     for (const auto& face : mesh.face)
         for (const std::uint32_t v : face) ASSERT_GE(mesh.position[v].y, -0.3f);

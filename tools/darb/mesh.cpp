@@ -2,12 +2,14 @@
 // darb mesh SCENE -o FILE: a surface out of the splats, as a triangle mesh.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,7 @@
 #include "engine/gpu/device.h"
 #include "engine/gpu/device_environment.h"
 #include "engine/mesh/clean.h"
+#include "engine/mesh/compare.h"
 #include "engine/mesh/mesh_file.h"
 #include "engine/mesh/tsdf.h"
 #include "engine/plan/effect_plan.h"
@@ -38,10 +41,13 @@ namespace {
 
 constexpr int kOrbitViews = 32, kOrbitWidth = 960, kOrbitHeight = 720;
 constexpr double kIslandExtent = 10;    // voxels
+constexpr double kFarOff = 1000;        // voxels: no reference of this scene
+constexpr double kLeftOut = 20;         // thresholds, the least one: not part of the mean distance
 constexpr double kWorkingShare = 0.85;  // of --max-memory for a range of blocks
 
 struct MeshFlags {
-    std::filesystem::path scene, cameras, output, json;
+    std::filesystem::path scene, cameras, output, json, reference;
+    std::vector<double> thresholds;  // world units; none: 1, 2 and 4 voxels
     std::string reading = "front", bounds, max_memory, texture = "vertex", device;
     std::string effects = "auto";
     float level = 0.5f, near_plane = static_cast<float>(NEAR_DEFAULT);
@@ -65,6 +71,7 @@ struct MeshReport {
     CleanReport clean;
     std::optional<double> simplified_by;  // largest distance of the full mesh, world units
     std::size_t views = 0, raw_faces = 0;
+    std::optional<MeshComparison> comparison;
 };
 
 WorldBox box_from(const std::string& text, const glm::dvec3& origin) {
@@ -92,9 +99,10 @@ std::vector<View> chosen_views(const MeshFlags& flags, const SplatModel& model) 
         say_note(fmt::format("cameras: the {} of the scene's run", views.size()));
         return views;
     }
-    say_note(fmt::format("cameras: {} around the scene, as none are named; a room needs those of "
-                         "its photos (--cameras)",
-                         kOrbitViews));
+    say_note(
+        fmt::format("cameras: {} around the scene, as none are named; a room needs those of "
+                    "its photos (--cameras)",
+                    kOrbitViews));
     for (const Camera& camera : orbit_cameras(model, kOrbitViews, kOrbitWidth, kOrbitHeight)) {
         View view;
         view.name = fmt::format("around_{:02}", views.size());
@@ -155,8 +163,9 @@ void clean(const MeshFlags& flags, const std::vector<DepthView>& views, const gl
     };
     report.clean = clean_mesh(mesh, options);
     if (mesh.face.empty())
-        throw Error(flags.output.string(), "nothing is left of the surface after cleaning",
-                    "Use a smaller --voxel, --min-island 0, or cameras that see more of the scene.");
+        throw Error(
+            flags.output.string(), "nothing is left of the surface after cleaning",
+            "Use a smaller --voxel, --min-island 0, or cameras that see more of the scene.");
     if (flags.faces > 0 && flags.faces < mesh.face_count()) {
         Simplified simplified = simplify_mesh(mesh, flags.faces);
         mesh = std::move(simplified.mesh);
@@ -165,36 +174,116 @@ void clean(const MeshFlags& flags, const std::vector<DepthView>& views, const gl
     set_normals(mesh);
 }
 
+/// Whether two cameras have the point in their pictures and nothing before it.
+bool is_seen_by_two(const std::vector<DepthView>& views, const glm::dvec3& p, double slack) {
+    int seen = 0;
+    for (const DepthView& view : views) {
+        const Camera& c = view.camera;
+        const glm::dvec3 q = c.rotation * p + c.translation;
+        const double x = c.fx * q.x / q.z + c.cx, y = c.fy * q.y / q.z + c.cy;
+        if (!(q.z > 0) || x < 0 || y < 0 || x >= c.width || y >= c.height) continue;
+        const double z = view.depth[std::size_t(y) * c.width + std::size_t(x)];
+        if (z > 0 && q.z > z + slack) continue;
+        if (++seen == 2) return true;
+    }
+    return false;
+}
+
+MeshComparison compare(const MeshFlags& flags, const std::vector<DepthView>& views, double voxel,
+                       const TriangleMesh& mesh) {
+    CompareOptions options;
+    options.spacing = voxel / 2;
+    options.thresholds = flags.thresholds;
+    if (options.thresholds.empty()) options.thresholds = {voxel, 2 * voxel, 4 * voxel};
+    options.left_out = kLeftOut * *std::ranges::min_element(options.thresholds);
+    options.far_off = kFarOff * voxel;
+    options.counts = [&](const glm::dvec3& p) { return is_seen_by_two(views, p, 4 * voxel); };
+    const std::string where = flags.reference.string();
+    if (has_extension(flags.reference, ".json"))
+        return compare_with_shapes(mesh, read_shapes(flags.reference), options, where);
+    std::vector<std::string> notes;
+    const TriangleMesh reference = read_mesh(flags.reference, &notes);
+    say_notes(notes);
+    return compare_meshes(mesh, reference, options, where);
+}
+
 double share(std::size_t part, std::size_t whole) {
     return whole > 0 ? double(part) / double(whole) : 0;
 }
 
+nlohmann::json distances_json(const DistanceStatistics& d) {
+    return {{"samples", d.samples},
+            {"mean", d.mean},
+            {"median", d.median},
+            {"p90", d.p90},
+            {"largest", d.largest}};
+}
+
+nlohmann::json comparison_json(const MeshComparison& c) {
+    nlohmann::json json{{"accuracy", distances_json(c.accuracy)}};
+    if (std::isfinite(c.bias)) json["bias"] = c.bias;
+    if (std::isfinite(c.normal_degrees)) json["normal_degrees"] = c.normal_degrees;
+    nlohmann::json& scores = json["f_scores"] = nlohmann::json::array();
+    for (const FScore& f : c.f_scores)
+        scores.push_back({{"threshold", f.threshold}, {"precision", f.precision}});
+    if (c.completeness.samples == 0) return json;  // shapes, which have no samples
+    for (std::size_t i = 0; i < scores.size(); ++i) {
+        scores[i]["recall"] = c.f_scores[i].recall;
+        scores[i]["f"] = c.f_scores[i].f();
+    }
+    json["completeness"] = distances_json(c.completeness);
+    json["chamfer"] = c.chamfer;
+    json["left_out_share"] = c.left_out_share;
+    return json;
+}
+
+void tell_comparison(std::FILE* out, const MeshComparison& c) {
+    const auto row = [&](const char* name, const char* what, const DistanceStatistics& d) {
+        tell(out, "{:<13} {:<18}  mean {:.4g}  median {:.4g}  90 % {:.4g}", name, what, d.mean,
+             d.median, d.p90);
+    };
+    row("accuracy", "mesh to reference", c.accuracy);
+    tell(out, "{}\n", std::isfinite(c.bias) ? fmt::format("  bias {:+.4g}", c.bias) : "");
+    if (c.completeness.samples > 0) {
+        row("completeness", "reference to mesh", c.completeness);
+        tell(out, "  Chamfer {:.4g} ({:.1f} % left out)\n", c.chamfer, 100 * c.left_out_share);
+    }
+    if (std::isfinite(c.normal_degrees))
+        tell(out, "normals off by {:.1f} degrees\n", c.normal_degrees);
+    for (const FScore& f : c.f_scores) {
+        tell(out, "within {:.4g}: precision {:.3f}", f.threshold, f.precision);
+        if (c.completeness.samples > 0) tell(out, "  recall {:.3f}  F {:.3f}", f.recall, f.f());
+        tell(out, "\n");
+    }
+}
+
 nlohmann::json report_json(const MeshFlags& flags, const MeshReport& r, const TriangleMesh& mesh) {
-    nlohmann::json json{
-        {"output", name_in_json(flags.json, flags.output)},
-        {"vertices", mesh.vertex_count()},
-        {"faces", mesh.face_count()},
-        {"voxel", r.tsdf.voxel},
-        {"farthest", r.tsdf.farthest},
-        {"depth", flags.reading},
-        {"level", flags.level},
-        {"views", r.views},
-        {"surface_share", share(r.depths.surfaces, r.depths.pixels)},
-        {"confirmed_share", share(r.depths.kept, r.depths.surfaces)},
-        {"blocks", r.tsdf.blocks},
-        {"ranges", r.tsdf.ranges},
-        {"raw_faces", r.raw_faces},
-        {"parts", r.clean.parts - r.clean.parts_removed},
-        {"parts_removed", r.clean.parts_removed},
-        {"holes_filled", r.clean.holes_filled},
-        {"holes_left", r.clean.holes_left}};
+    nlohmann::json json{{"output", name_in_json(flags.json, flags.output)},
+                        {"vertices", mesh.vertex_count()},
+                        {"faces", mesh.face_count()},
+                        {"voxel", r.tsdf.voxel},
+                        {"farthest", r.tsdf.farthest},
+                        {"depth", flags.reading},
+                        {"level", flags.level},
+                        {"views", r.views},
+                        {"surface_share", share(r.depths.surfaces, r.depths.pixels)},
+                        {"confirmed_share", share(r.depths.kept, r.depths.surfaces)},
+                        {"blocks", r.tsdf.blocks},
+                        {"ranges", r.tsdf.ranges},
+                        {"raw_faces", r.raw_faces},
+                        {"parts", r.clean.parts - r.clean.parts_removed},
+                        {"parts_removed", r.clean.parts_removed},
+                        {"holes_filled", r.clean.holes_filled},
+                        {"holes_left", r.clean.holes_left}};
     if (r.simplified_by) json["simplified_by"] = *r.simplified_by;
+    if (r.comparison) json["comparison"] = comparison_json(*r.comparison);
     return json;
 }
 
 void tell_report(std::FILE* out, const MeshReport& r, const TriangleMesh& mesh) {
-    tell(out, "{} views: {:.0f} % of the pixels show a surface, other views confirm {:.0f} % of "
-              "those\n",
+    tell(out,
+         "{} views: {:.0f} % of the pixels show a surface, other views confirm {:.0f} % of "
+         "those\n",
          r.views, 100 * share(r.depths.surfaces, r.depths.pixels),
          100 * share(r.depths.kept, r.depths.surfaces));
     tell(out, "voxel {:.4g}, {} blocks of {} voxels in {} range{}, depths up to {:.4g}\n",
@@ -205,6 +294,7 @@ void tell_report(std::FILE* out, const MeshReport& r, const TriangleMesh& mesh) 
     if (r.simplified_by)
         tell(out, "simplified: the full surface is at most {:.4g} away\n", *r.simplified_by);
     tell(out, "{} vertices, {} faces\n", mesh.vertex_count(), mesh.face_count());
+    if (r.comparison) tell_comparison(out, *r.comparison);
 }
 
 TriangleMesh make_mesh(const MeshFlags& flags, const std::atomic<bool>& stop, MeshReport& report) {
@@ -236,18 +326,24 @@ TriangleMesh make_mesh(const MeshFlags& flags, const std::atomic<bool>& stop, Me
     clean(f, seen, model.origin, mesh, report);
     if (f.texture == "vertex")
         bake_colours(device, seen, mesh, report.tsdf.voxel, f.tsdf.working_bytes, progress);
+    if (!f.reference.empty()) {
+        progress("comparison", 0);
+        report.comparison = compare(f, seen, report.tsdf.voxel, mesh);
+    }
     progress("files", 0);
     return mesh;
 }
 
 int mesh(const MeshFlags& flags) {
-    const Paths inputs = together({files_of(flags.scene), files_of(flags.cameras)});
+    const Paths inputs =
+        together({files_of(flags.scene), files_of(flags.cameras), Paths{flags.reference}});
     refuse_to_overwrite_inputs({flags.output, flags.json}, inputs, Replaces::all);
     const WrittenFiles written(files_of(flags.scene), flags.force);
     written.check({flags.output});
     if (mesh_endings().find(flags.output.extension().string()) == std::string::npos ||
         flags.output.extension().empty())
-        throw Error(flags.output.string(), "has no ending of a mesh", "Use " + mesh_endings() + ".");
+        throw Error(flags.output.string(), "has no ending of a mesh",
+                    "Use " + mesh_endings() + ".");
     if (flags.faces > 0 && !can_simplify())
         throw Error("--faces", "this darb was built without meshoptimizer",
                     "Install libmeshoptimizer-dev and build it again, or leave --faces out.");
@@ -276,8 +372,8 @@ void add_surface_options(CLI::App& c, MeshFlags& flags) {
                  "how a splat takes light along a ray: front, solid, plane, or expected, the mean "
                  "of the centres")
         ->capture_default_str()
-        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kDepthReadings),
-                                                       std::end(kDepthReadings))));
+        ->check(CLI::IsMember(
+            std::vector<std::string>(std::begin(kDepthReadings), std::end(kDepthReadings))));
     c.add_option("--level", flags.level, "share of the light that is left at the surface")
         ->capture_default_str()
         ->check(CLI::Range(0.01, 0.99));
@@ -319,6 +415,18 @@ void add_cleaning_options(CLI::App& c, MeshFlags& flags) {
         ->check(CLI::IsMember({"none", "vertex"}));
 }
 
+void add_reference_options(CLI::App& c, MeshFlags& flags) {
+    CLI::Option* const reference = c.add_option(
+        "--reference", flags.reference,
+        "compare with this: a mesh or points (" + mesh_endings() + "), or a .json of exact shapes");
+    c.add_option("--thresholds", flags.thresholds,
+                 "distances of the F-score, world units, with commas")
+        ->delimiter(',')
+        ->check(above_zero())
+        ->default_str("1, 2 and 4 voxels")
+        ->needs(reference);
+}
+
 }  // namespace
 
 void add_mesh(CLI::App& app, Action& action) {
@@ -338,6 +446,7 @@ void add_mesh(CLI::App& app, Action& action) {
                         "of a data set's cameras: 1, 2, 4, 8 or a width in px");
     add_surface_options(*command, *flags);
     add_cleaning_options(*command, *flags);
+    add_reference_options(*command, *flags);
     command->add_flag("--force", flags->force, "replace a file that darb did not write");
     add_json_option(*command, flags->json);
     add_kernel_flags(*command, flags->kernel, "draw with it in the place of the scene's own");
