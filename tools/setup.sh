@@ -41,6 +41,7 @@ build    libzip-dev           SOG files
 build    libwebp-dev          SOG files
 build    libeigen3-dev        matrix products of LPIPS
 build    libmuparser-dev      kernels as expressions
+build    libmeshoptimizer-dev simplification of meshes
 build    libglfw3-dev         window of the viewer
 build    libimgui-dev         panels of the viewer
 build    fonts-roboto-unhinted  their letters
@@ -56,6 +57,7 @@ tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effect
 tests    python3              style script (standard library only)
 tests    universal-ctags      sizes of functions and classes, tools/lab/structure.py
 tests    ffmpeg               the video of a camera path
+tests    assimp-utils         a second reader of the meshes that are written
 tests    python3-dev          the Python module, which every build of the tests loads
 tests    pybind11-dev         the Python module
 tests    python3-numpy        its arrays

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// TriangleMesh: a surface as an indexed list of triangles, on the host.
+// TriangleMesh: a surface as an indexed list of triangles, on the host, and its texture.
 #pragma once
 
 #include <array>
@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <vector>
+
+#include "engine/core/image.h"
 
 namespace darb {
 
@@ -22,6 +24,14 @@ struct TriangleMesh {
 
     std::size_t vertex_count() const { return position.size(); }
     std::size_t face_count() const { return face.size(); }
+};
+
+/// A texture on F faces. A vertex between two charts has several places on the pages, so they are
+/// given by face. (0, 0) is the top left corner of a page, (1, 1) its bottom right one.
+struct MeshTexture {
+    std::vector<std::array<glm::vec2, 3>> uv;  // [F] of the corners of the face
+    std::vector<std::uint32_t> page;           // [F]
+    std::vector<ImageU8> image;                // [pages] sRGB, 3 channels
 };
 
 }  // namespace darb

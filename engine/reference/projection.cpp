@@ -298,6 +298,13 @@ void set_shape(const Camera& camera, const RenderSettings& settings,
         terms.root * (Vec3<T>(0, 0, 1) * view_rotation<T>(camera) * rotation.matrix) * terms.scale;
     const T c1 = glm::dot(r3, terms.r1), c2 = glm::dot(r3, terms.r2);
     p.depth_slope = {p.l11 * c1 + p.l21 * c2, p.l22 * c2};
+    const Vec3<T> n1 = terms.r1 * terms.shrink, n2 = terms.r2 * terms.shrink;
+    const T h = T(settings.low_pass) * area, volume = glm::dot(glm::cross(n1, n2), r3);
+    const Vec3<T> across1 = glm::cross(n1, r3), across2 = glm::cross(n2, r3);
+    p.depth_deviation =
+        std::sqrt((volume * volume + h * (glm::dot(across1, across1) + glm::dot(across2, across2)) +
+                   h * h * glm::dot(r3, r3)) /
+                  terms.det);
 }
 
 template <class T>

@@ -35,6 +35,8 @@ struct ProjectedSplat {
     /// The splat's depth at a pixel is depth - depth_slope . (u, v) in the mean, where (u, v) is
     /// the offset whitened by the factor l11, l21, l22.
     Vec2<T> depth_slope{0};
+    /// The deviation of its depth, given the pixel; world units.
+    T depth_deviation = 0;
 };
 
 /// The nearest half-precision number, ties to even, of a value in the range of normal halves.

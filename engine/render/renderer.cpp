@@ -114,7 +114,8 @@ Renderer::Renderer(Device& device, const SplatModel& model, const ForwardOptions
     : Renderer(device, model, frame_of(model, options)) {}
 
 Renderer::Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy)
-    : accuracy_(accuracy),
+    : device_(&device),
+      accuracy_(accuracy),
       splats_(device, model, false),
       buffers_(device, accuracy_.options),
       forward_(device, accuracy_.options),
@@ -170,6 +171,21 @@ ImageF Renderer::render_depth() {
     pass_times_ = commands_.pass_times();
     const size_t floats = 2 * size_t(width) * size_t(height);
     return depth_image(buffers_.frame().images.image.download<float>(floats), width, height);
+}
+
+ImageF Renderer::render_depth(DepthReading reading, float level) {
+    if (reading == DepthReading::expected) return render_depth();
+    if (view_.camera.width == 0)
+        throw Error("render", "there is no picture to take depths from", "Call render() first.");
+    std::optional<MedianDepth>& median = median_[static_cast<std::size_t>(reading)];
+    if (!median) median.emplace(*device_, forward_.options(), reading);
+    commands_.begin();
+    median->record(commands_, splats_, view_, buffers_.frame(), status_.longest_list, level);
+    commands_.submit_and_wait();
+    pass_times_ = commands_.pass_times();
+    ImageF image(static_cast<int>(view_.camera.width), static_cast<int>(view_.camera.height), 2);
+    image.data = median->depth().download<float>(image.data.size());
+    return image;
 }
 
 }  // namespace darb

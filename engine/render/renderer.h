@@ -2,6 +2,7 @@
 // Renderer: one model on one device, and pictures of it from any camera, at a chosen accuracy.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "engine/core/image.h"
@@ -10,6 +11,7 @@
 #include "engine/plan/accuracy.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
+#include "engine/raster/median_depth.h"
 #include "engine/scene/camera.h"
 #include "shaders/shared/render_args.h"
 
@@ -78,6 +80,11 @@ class Renderer {
     /// sum w z / sum w along the optical axis, world units, and sum w, the opacity of the pixel.
     /// Depth is 0 where nothing is seen (opacity below 1/255).
     ImageF render_depth();
+    /// [H][W][2] for the camera of the last render, which must have taken place: the depth along
+    /// the optical axis, world units, at which the share `level` of the light is left, and the
+    /// opacity of the pixel. Depth is 0 where more is left behind all splats. `expected` is
+    /// render_depth(), without a level. Throws Error where the kernel has no such reading.
+    ImageF render_depth(DepthReading reading, float level = 0.5f);
 
     /// The status of the last render.
     gpu::FrameStatus status() const { return status_; }
@@ -86,6 +93,7 @@ class Renderer {
   private:
     Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy);
 
+    Device* device_;
     FrameAccuracy accuracy_;
     GpuSplats splats_;
     FrameBuffers buffers_;
@@ -95,6 +103,7 @@ class Renderer {
     Commands commands_;
     gpu::FrameStatus status_{};
     FrameView view_;  // view of the last render
+    std::array<std::optional<MedianDepth>, std::size(kDepthReadings)> median_;  // once asked for
     std::vector<PassTime> pass_times_;
 };
 

@@ -166,8 +166,7 @@ int components_of(const std::string& type, const std::string& what) {
         {"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}};
     for (const auto& [name, count] : kTypes)
         if (type == name) return count;
-    throw Error(what, "has the type '" + printable(type) + "', which no attribute of splats has",
-                kCopyAgain);
+    throw Error(what, "has the type '" + printable(type) + "', which no attribute has", kCopyAgain);
 }
 
 }  // namespace
@@ -271,6 +270,86 @@ Accessor find_accessor(const Document& document, std::size_t index, const std::s
     return result;
 }
 
+namespace {
+
+glm::dmat4 matrix_of(const json& node) {
+    glm::dmat4 matrix(1.0);
+    if (node.contains("matrix")) {
+        for (int c = 0; c < 16; ++c)
+            matrix[c / 4][c % 4] = node.at("matrix").at(static_cast<std::size_t>(c)).get<double>();
+        return matrix;
+    }
+    const auto number = [&](const char* key, std::size_t i, double otherwise) {
+        return node.contains(key) ? node.at(key).at(i).get<double>() : otherwise;
+    };
+    const glm::dquat turn(number("rotation", 3, 1), number("rotation", 0, 0),
+                          number("rotation", 1, 0), number("rotation", 2, 0));
+    const glm::dmat3 axes = glm::mat3_cast(turn);
+    for (int c = 0; c < 3; ++c) {
+        matrix[c] = glm::dvec4(axes[c] * number("scale", static_cast<std::size_t>(c), 1), 0.0);
+        matrix[3][c] = number("translation", static_cast<std::size_t>(c), 0);
+    }
+    return matrix;
+}
+
+/// The nodes that are drawn: those of the scene, or all that are no node's children.
+std::vector<std::size_t> root_nodes(const json& document, std::size_t count) {
+    std::vector<std::size_t> roots;
+    if (document.contains("scenes") && !document.at("scenes").empty()) {
+        const json& scene = document.at("scenes").at(whole_number(document, "scene", 0));
+        for (const json& node : scene.value("nodes", json::array()))
+            roots.push_back(node.get<std::size_t>());
+        return roots;
+    }
+    std::vector<bool> child(count, false);
+    for (const json& node : document.value("nodes", json::array()))
+        for (const json& one : node.value("children", json::array()))
+            if (const auto at = one.get<std::size_t>(); at < count) child[at] = true;
+    for (std::size_t i = 0; i < count; ++i)
+        if (!child[i]) roots.push_back(i);
+    return roots;
+}
+
+}  // namespace
+
+void check_extensions(const Document& document, std::span<const char* const> known) {
+    for (const json& one : document.json.value("extensionsRequired", json::array()))
+        if (const auto name = one.get<std::string>();
+            std::ranges::find(known, name) == std::end(known))
+            throw Error(document.where, "needs " + printable(name) + ", which is not read",
+                        "Export the scene without compression.");
+}
+
+void visit_meshes(const Document& document,
+                  const std::function<void(const json& mesh, const glm::dmat4& to_world)>& visit) {
+    const json none = json::array();
+    const json& nodes = document.json.contains("nodes") ? document.json.at("nodes") : none;
+    struct Visit {
+        std::size_t node;
+        glm::dmat4 parent;
+    };
+    std::vector<Visit> stack;
+    for (const std::size_t root : root_nodes(document.json, nodes.size()))
+        stack.push_back({root, kFromYUp});
+    std::reverse(stack.begin(), stack.end());
+    std::vector<bool> seen(nodes.size(), false);
+    while (!stack.empty()) {
+        const Visit next = stack.back();
+        stack.pop_back();
+        const json& node = nodes.at(next.node);
+        if (seen[next.node])
+            throw Error(document.where,
+                        fmt::format("node {} is met twice: nodes are no tree", next.node),
+                        kCopyAgain);
+        seen[next.node] = true;
+        const glm::dmat4 to_world = next.parent * matrix_of(node);
+        if (node.contains("mesh"))
+            visit(document.json.at("meshes").at(whole_number(node, "mesh")), to_world);
+        for (const json& child : node.value("children", json::array()))
+            stack.push_back({child.get<std::size_t>(), to_world});
+    }
+}
+
 }  // namespace darb::gltf
 
 namespace darb {
@@ -281,8 +360,6 @@ using gltf::Accessor;
 using gltf::Document;
 using nlohmann::json;
 
-// glTF has y up and z backward; scenes in memory have y down and z forward, as SPZ's are turned.
-const glm::dmat4 kFromYUp(1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1);
 constexpr double kSameLength = 1e-4;  // relative tolerance for the lengths of a node's axes
 
 unsigned bit(gltf::ComponentType type, bool normalized) {
@@ -357,44 +434,6 @@ void fill(const GltfScene& scene, const Accessor& from, const char* name, std::s
 
 constexpr auto kAsItIs = [](double value) { return value; };
 
-glm::dmat4 matrix_of(const json& node) {
-    glm::dmat4 matrix(1.0);
-    if (node.contains("matrix")) {
-        for (int c = 0; c < 16; ++c)
-            matrix[c / 4][c % 4] = node.at("matrix").at(static_cast<std::size_t>(c)).get<double>();
-        return matrix;
-    }
-    const auto number = [&](const char* key, std::size_t i, double otherwise) {
-        return node.contains(key) ? node.at(key).at(i).get<double>() : otherwise;
-    };
-    const glm::dquat turn(number("rotation", 3, 1), number("rotation", 0, 0),
-                          number("rotation", 1, 0), number("rotation", 2, 0));
-    const glm::dmat3 axes = glm::mat3_cast(turn);
-    for (int c = 0; c < 3; ++c) {
-        matrix[c] = glm::dvec4(axes[c] * number("scale", static_cast<std::size_t>(c), 1), 0.0);
-        matrix[3][c] = number("translation", static_cast<std::size_t>(c), 0);
-    }
-    return matrix;
-}
-
-/// The nodes that are drawn: those of the scene, or all that are no node's children.
-std::vector<std::size_t> root_nodes(const json& document, std::size_t count) {
-    std::vector<std::size_t> roots;
-    if (document.contains("scenes") && !document.at("scenes").empty()) {
-        const json& scene = document.at("scenes").at(gltf::whole_number(document, "scene", 0));
-        for (const json& node : scene.value("nodes", json::array()))
-            roots.push_back(node.get<std::size_t>());
-        return roots;
-    }
-    std::vector<bool> child(count, false);
-    for (const json& node : document.value("nodes", json::array()))
-        for (const json& one : node.value("children", json::array()))
-            if (const auto at = one.get<std::size_t>(); at < count) child[at] = true;
-    for (std::size_t i = 0; i < count; ++i)
-        if (!child[i]) roots.push_back(i);
-    return roots;
-}
-
 /// Collects the splats of a mesh; other primitives are counted.
 void add_splats_of(const json& mesh, const glm::dmat4& to_world, std::vector<PlacedSplats>& placed,
                    std::size_t& others) {
@@ -409,36 +448,13 @@ void add_splats_of(const json& mesh, const glm::dmat4& to_world, std::vector<Pla
 }
 
 std::vector<PlacedSplats> placed_splats(GltfScene& scene) {
-    const json& document = scene.document.json;
-    const json none = json::array();
-    const json& nodes = document.contains("nodes") ? document.at("nodes") : none;
-    struct Visit {
-        std::size_t node;
-        glm::dmat4 parent;
-    };
-    std::vector<Visit> stack;
-    for (const std::size_t root : root_nodes(document, nodes.size()))
-        stack.push_back({root, kFromYUp});
-    std::reverse(stack.begin(), stack.end());
-    std::vector<bool> seen(nodes.size(), false);
     std::vector<PlacedSplats> placed;
     std::size_t others = 0;
-    while (!stack.empty()) {
-        const Visit visit = stack.back();
-        stack.pop_back();
-        const json& node = nodes.at(visit.node);
-        if (seen[visit.node])
-            throw scene.wrong(fmt::format("node {} is met twice: nodes are no tree", visit.node));
-        seen[visit.node] = true;
-        const glm::dmat4 to_world = visit.parent * matrix_of(node);
-        if (node.contains("mesh"))
-            add_splats_of(document.at("meshes").at(gltf::whole_number(node, "mesh")), to_world,
-                          placed, others);
+    gltf::visit_meshes(scene.document, [&](const json& mesh, const glm::dmat4& to_world) {
+        add_splats_of(mesh, to_world, placed, others);
         check_expansion(scene.document.bytes, sizeof(PlacedSplats) * (placed.size() + others),
                         scene.document.where);
-        for (const json& child : node.value("children", json::array()))
-            stack.push_back({child.get<std::size_t>(), to_world});
-    }
+    });
     if (placed.empty())
         throw scene.wrong(
             fmt::format("holds no splats: no primitive that is drawn has {}", gltf::kSplats),
@@ -681,15 +697,6 @@ SplatModel joined(const std::vector<SplatModel>& parts) {
     return all;
 }
 
-void check_extensions(const GltfScene& scene) {
-    constexpr const char* kKnown[] = {gltf::kSplats, gltf::kRadial, "KHR_mesh_quantization"};
-    for (const json& one : scene.document.json.value("extensionsRequired", json::array()))
-        if (const auto name = one.get<std::string>();
-            std::ranges::find(kKnown, name) == std::end(kKnown))
-            throw scene.wrong("needs " + printable(name) + ", which is not read",
-                              "Export the scene without compression.");
-}
-
 SplatModel load_gltf(const SplatSource& source, SplatFile& file) try {
     const Document document = gltf::open_document(source);
     GltfScene scene{document, file};
@@ -703,7 +710,8 @@ SplatModel load_gltf(const SplatSource& source, SplatFile& file) try {
     file.details = starts_with(source.bytes, "glTF") ? "binary" : "JSON";
     if (asset.contains("generator"))
         file.details += ", by " + asset.at("generator").get<std::string>();
-    check_extensions(scene);
+    constexpr const char* kKnown[] = {gltf::kSplats, gltf::kRadial, "KHR_mesh_quantization"};
+    gltf::check_extensions(document, kKnown);
     const std::vector<PlacedSplats> placed = placed_splats(scene);
     std::uint64_t splats = 0;
     for (const PlacedSplats& one : placed)
@@ -756,54 +764,13 @@ namespace {
 
 using nlohmann::json;
 
-/// The buffer and the JSON that describes it, as they grow.
-struct GltfWriter {
-    std::vector<std::byte> buffer;
-    json views = json::array(), accessors = json::array();
-
-    /// [N][components]; returns the accessor's index.
-    template <class T>
-    std::size_t add(const std::vector<T>& values, int components, json facts = json::object()) {
-        constexpr bool kByte = sizeof(T) == 1;
-        static_assert(kByte || sizeof(T) == sizeof(float));
-        const auto bytes = std::as_bytes(std::span(values));
-        views.push_back({{"buffer", 0},
-                         {"byteOffset", buffer.size()},
-                         {"byteLength", bytes.size()},
-                         {"target", 34962}});  // vertex attributes
-        buffer.insert(buffer.end(), bytes.begin(), bytes.end());
-        buffer.resize((buffer.size() + 3) / 4 * 4);
-        facts["bufferView"] = views.size() - 1;
-        facts["componentType"] = static_cast<int>(kByte ? kUint8 : kFloat);
-        if (kByte) facts["normalized"] = true;
-        facts["count"] = values.size() / static_cast<std::size_t>(components);
-        facts["type"] = components == 1 ? "SCALAR" : fmt::format("VEC{}", components);
-        accessors.push_back(std::move(facts));
-        return accessors.size() - 1;
-    }
-};
-
 /// Whether darb's own extension is needed, for what KHR_gaussian_splatting cannot store.
 bool is_radial(const SplatModel& model) {
     return model.kernel != KERNEL_GAUSSIAN || model.footprint != Footprint::psi ||
            model.antialias || model.origin != glm::dvec3(0.0);
 }
 
-json bounds_of(const std::vector<float>& position) {
-    json low = json::array(), high = json::array();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        float least = std::numeric_limits<float>::infinity(), most = -least;
-        for (std::size_t i = axis; i < position.size(); i += 3) {
-            least = std::min(least, position[i]);
-            most = std::max(most, position[i]);
-        }
-        low.push_back(least);
-        high.push_back(most);
-    }
-    return {{"min", low}, {"max", high}};
-}
-
-void add_shape(const SplatModel& model, GltfWriter& to, json& attributes) {
+void add_shape(const SplatModel& model, Writer& to, json& attributes) {
     const std::size_t count = model.size();
     std::vector<float> scale(3 * count), rotation(4 * count), opacity(count);
     std::ranges::transform(model.log_scale, scale.begin(), [](float value) {
@@ -822,7 +789,7 @@ void add_shape(const SplatModel& model, GltfWriter& to, json& attributes) {
     attributes[kOpacity] = to.add(opacity, 1);
 }
 
-void add_colours(const SplatModel& model, GltfWriter& to, json& attributes) {
+void add_colours(const SplatModel& model, Writer& to, json& attributes) {
     std::vector<std::uint8_t> colour(4 * model.size());
     for (std::size_t i = 0; i < model.size(); ++i) {
         for (std::size_t k = 0; k < 3; ++k)
@@ -840,7 +807,7 @@ void add_colours(const SplatModel& model, GltfWriter& to, json& attributes) {
     }
 }
 
-json radial_extension(const SplatModel& model, GltfWriter& to) {
+json radial_extension(const SplatModel& model, Writer& to) {
     const json exact = {{"LOG_SCALE", to.add(model.log_scale, 3)},
                         {"ROTATION", to.add(model.rotation, 4)},
                         {"OPACITY_LOGIT", to.add(model.opacity_logit, 1)}};
@@ -853,7 +820,7 @@ json radial_extension(const SplatModel& model, GltfWriter& to) {
     return radial;
 }
 
-json document_of(const SplatModel& model, GltfWriter& to) {
+json document_of(const SplatModel& model, Writer& to) {
     json attributes, used = json::array({kSplats});
     attributes["POSITION"] = to.add(model.position, 3, bounds_of(model.position));
     add_shape(as_gaussians(model, false), to, attributes);
@@ -866,21 +833,12 @@ json document_of(const SplatModel& model, GltfWriter& to) {
         splats["extensions"] = {{kRadial, radial_extension(model, to)}};
         used.push_back(kRadial);
     }
-    // Half a turn about x: y down and z forward become y up and z backward.
-    json node = {{"mesh", 0}, {"rotation", {1, 0, 0, 0}}};
-    if (model.origin != glm::dvec3(0.0))
-        node["translation"] = {model.origin.x, -model.origin.y, -model.origin.z};
+    json node = node_at(model.origin);
+    node["mesh"] = 0;
     const json primitive = {
         {"attributes", attributes}, {"mode", 0}, {"extensions", {{kSplats, splats}}}};
-    return {{"asset", {{"version", "2.0"}, {"generator", "darb " DARB_VERSION}}},
-            {"extensionsUsed", used},
-            {"scene", 0},
-            {"scenes", {{{"nodes", {0}}}}},
-            {"nodes", {node}},
-            {"meshes", {{{"primitives", {primitive}}}}},
-            {"accessors", to.accessors},
-            {"bufferViews", to.views},
-            {"buffers", {{{"byteLength", to.buffer.size()}}}}};
+    return {
+        {"extensionsUsed", used}, {"nodes", {node}}, {"meshes", {{{"primitives", {primitive}}}}}};
 }
 
 void append_bytes(const std::string& text, std::vector<std::byte>& to) {
@@ -899,7 +857,7 @@ std::vector<std::byte> glb_of(std::string text, const std::vector<std::byte>& bu
     const std::uint64_t length = kGlbHeader + 2 * kGlbChunkHeader + text.size() + buffer.size();
     if (length > std::numeric_limits<std::uint32_t>::max())
         throw Error(where, fmt::format("would have {} bytes; a .glb has 4 GiB at most", length),
-                    "Write a .gltf, or fewer splats.");
+                    "Write a .gltf, or less.");
     std::vector<std::byte> file;
     file.reserve(length);
     append_word(kGlbMagic, file);
@@ -914,6 +872,63 @@ std::vector<std::byte> glb_of(std::string text, const std::vector<std::byte>& bu
     return file;
 }
 
+}  // namespace
+
+template <class T>
+std::size_t Writer::add(const std::vector<T>& values, int components, json facts) {
+    constexpr ComponentType kType = sizeof(T) == 1 ? kUint8 : sizeof(T) == 2 ? kUint16 : kFloat;
+    facts["bufferView"] = add_view(std::as_bytes(std::span(values)), {{"target", 34962}});
+    facts["componentType"] = static_cast<int>(kType);
+    if (kType != kFloat) facts["normalized"] = true;
+    facts["count"] = values.size() / static_cast<std::size_t>(components);
+    facts["type"] = components == 1 ? "SCALAR" : fmt::format("VEC{}", components);
+    accessors.push_back(std::move(facts));
+    return accessors.size() - 1;
+}
+template std::size_t Writer::add(const std::vector<float>&, int, json);
+template std::size_t Writer::add(const std::vector<std::uint8_t>&, int, json);
+template std::size_t Writer::add(const std::vector<std::uint16_t>&, int, json);
+
+std::size_t Writer::add_indices(std::span<const std::uint32_t> values) {
+    const std::size_t view = add_view(std::as_bytes(values), {{"target", 34963}});
+    accessors.push_back({{"bufferView", view},
+                         {"componentType", static_cast<int>(kUint32)},
+                         {"count", values.size()},
+                         {"type", "SCALAR"}});
+    return accessors.size() - 1;
+}
+
+std::size_t Writer::add_view(std::span<const std::byte> bytes, json facts) {
+    facts["buffer"] = 0;
+    facts["byteOffset"] = buffer.size();
+    facts["byteLength"] = bytes.size();
+    views.push_back(std::move(facts));
+    buffer.insert(buffer.end(), bytes.begin(), bytes.end());
+    buffer.resize((buffer.size() + 3) / 4 * 4);
+    return views.size() - 1;
+}
+
+json bounds_of(const std::vector<float>& position) {
+    json low = json::array(), high = json::array();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        float least = std::numeric_limits<float>::infinity(), most = -least;
+        for (std::size_t i = axis; i < position.size(); i += 3) {
+            least = std::min(least, position[i]);
+            most = std::max(most, position[i]);
+        }
+        low.push_back(least);
+        high.push_back(most);
+    }
+    return {{"min", low}, {"max", high}};
+}
+
+json node_at(const glm::dvec3& origin) {
+    // Half a turn about x: y down and z forward become y up and z backward.
+    json node = {{"rotation", {1, 0, 0, 0}}};
+    if (origin != glm::dvec3(0.0)) node["translation"] = {origin.x, -origin.y, -origin.z};
+    return node;
+}
+
 std::string percent_encoded(const std::string& name) {
     std::string uri;
     for (const char c : name) {
@@ -924,7 +939,22 @@ std::string percent_encoded(const std::string& name) {
     return uri;
 }
 
-}  // namespace
+EncodedSplats pack_document(json document, Writer&& writer, const std::string& where) {
+    document["asset"] = {{"version", "2.0"}, {"generator", "darb " DARB_VERSION}};
+    document["scene"] = 0;
+    document["scenes"] = json::array({json{{"nodes", {0}}}});
+    document["accessors"] = std::move(writer.accessors);
+    document["bufferViews"] = std::move(writer.views);
+    document["buffers"] = json::array({json{{"byteLength", writer.buffer.size()}}});
+    const auto text = [&] { return document.dump(-1, ' ', false, json::error_handler_t::replace); };
+    if (!lower(where).ends_with(".gltf")) return {glb_of(text(), writer.buffer, where)};
+    const std::string name = std::filesystem::path(where).stem().string() + ".bin";
+    document["buffers"][0]["uri"] = percent_encoded(name);
+    EncodedSplats encoded;
+    append_bytes(text(), encoded.file);
+    encoded.beside.emplace_back(name, std::move(writer.buffer));
+    return encoded;
+}
 
 std::vector<std::string> fallback_losses(const SplatModel& model, const std::string&) {
     if (model.kernel == KERNEL_GAUSSIAN) return {};
@@ -940,16 +970,9 @@ EncodedSplats encode(const SplatModel& model, const std::string& where, const En
     check_splat_shapes(model);
     if (model.size() == 0)
         throw Error(where, "glTF cannot store a scene without splats", "Write a PLY.");
-    GltfWriter writer;
+    Writer writer;
     json document = document_of(model, writer);
-    const auto text = [&] { return document.dump(-1, ' ', false, json::error_handler_t::replace); };
-    if (!lower(where).ends_with(".gltf")) return {glb_of(text(), writer.buffer, where)};
-    const std::string name = std::filesystem::path(where).stem().string() + ".bin";
-    document["buffers"][0]["uri"] = percent_encoded(name);
-    EncodedSplats encoded;
-    append_bytes(text(), encoded.file);
-    encoded.beside.emplace_back(name, std::move(writer.buffer));
-    return encoded;
+    return pack_document(std::move(document), std::move(writer), where);
 }
 
 }  // namespace darb::gltf

@@ -179,15 +179,15 @@ class RowReader {
     RowReader(std::span<const std::byte> file, const PlyHeader& header, const std::string& where)
         : file_(file), at_(header.data_begin), format_(header.format), where_(where) {}
 
-    void read(const PlyElement& element, std::size_t row, double* values) {
+    void read(const PlyElement& element, std::size_t row, double* values, const PlyList& list) {
         const std::size_t begin = format_ == PlyFormat::ascii ? next_text() : at_;
-        for (const PlyProperty& property : element.properties) {
-            *values = next(element, row, property.is_list ? property.count_type : property.type);
-            if (property.is_list) {
-                skip_list(element, row, property, *values);
-                *values = 0;
-            }
-            ++values;
+        for (std::size_t c = 0; c < element.properties.size(); ++c) {
+            const PlyProperty& property = element.properties[c];
+            values[c] = next(element, row, property.is_list ? property.count_type : property.type);
+            if (!property.is_list) continue;
+            read_list(element, row, property, values[c], static_cast<bool>(list));
+            values[c] = 0;
+            if (list) list(row, c, list_);
         }
         check_line(element, row, begin);
     }
@@ -294,20 +294,25 @@ class RowReader {
             "Correct the header or the line, or export the file again.");
     }
 
-    void skip_list(const PlyElement& element, std::size_t row, const PlyProperty& property,
-                   double length) {
+    /// keep: into list_; else the list is only passed over.
+    void read_list(const PlyElement& element, std::size_t row, const PlyProperty& property,
+                   double length, bool keep) {
         if (!(length >= 0)) fail(element, row, "a list has a negative length");
         const std::size_t size = format_ == PlyFormat::ascii ? 1 : type_size(property.type);
         if (length > static_cast<double>((file_.size() - at_) / size))
             fail(element, row, "a list is longer than the file");
-        if (format_ != PlyFormat::ascii) {
+        list_.clear();
+        if (!keep && format_ != PlyFormat::ascii) {
             at_ += static_cast<std::size_t>(length) * size;
             return;
         }
-        for (auto left = static_cast<std::size_t>(length); left > 0; --left)
-            next_word(element, row);
+        for (auto left = static_cast<std::size_t>(length); left > 0; --left) {
+            const double value = next(element, row, property.type);
+            if (keep) list_.push_back(value);
+        }
     }
 
+    std::vector<double> list_;  // the last that was kept
     std::span<const std::byte> file_;
     bool rows_are_lines_ = false;
     std::size_t at_;
@@ -388,17 +393,18 @@ void check_ply_size(std::span<const std::byte> file, const PlyHeader& header,
 
 std::size_t read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
                           const PlyElement& element, const std::string& where, const PlyRow& row,
-                          const ReadProgress& progress) {
+                          const ReadProgress& progress, const PlyList& list) {
     check_ply_size(file, header, element, where);
     RowReader reader(file, header, where);
     for (const PlyElement& candidate : header.elements) {
         if (candidate.properties.empty()) continue;  // takes no bytes, however many rows it has
         std::vector<double> values(candidate.properties.size());
         const bool wanted = &candidate == &element;
+        const PlyList lists = wanted ? list : PlyList{};
         for (std::size_t i = 0; i < candidate.count; ++i) {
             if (wanted && progress && i % kProgressRows == 0)
                 progress(static_cast<double>(i) / static_cast<double>(candidate.count));
-            reader.read(candidate, i, values.data());
+            reader.read(candidate, i, values.data(), lists);
             if (wanted) row(i, values.data());
         }
         if (wanted) break;

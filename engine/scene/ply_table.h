@@ -54,12 +54,15 @@ void check_ply_size(std::span<const std::byte> file, const PlyHeader& header,
 /// Calls row(i, values) for each row i of the element; values[c] is column c (0 for lists). Skips
 /// the elements before it. Returns where the rows end. Throws Error naming the row where the file
 /// ends or has something else than a number. progress: called now and then with the share of rows
-/// read; it may throw to stop.
+/// read; it may throw to stop. list: called before row(i) with each list of the row; lists are
+/// skipped where it is empty.
 using PlyRow = std::function<void(std::size_t row, const double* values)>;
+using PlyList =
+    std::function<void(std::size_t row, std::size_t column, std::span<const double> values)>;
 using ReadProgress = std::function<void(double share)>;
 std::size_t read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
                           const PlyElement& element, const std::string& where, const PlyRow& row,
-                          const ReadProgress& progress = {});
+                          const ReadProgress& progress = {}, const PlyList& list = {});
 
 /// A sentence on bytes after the last row of the last element, which ends at `end`. Empty where
 /// there are none, or where `element` is not the last. Spaces and line ends do not count in ascii

@@ -19,10 +19,12 @@
 #include "engine/data/transforms.h"
 #include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/mesh/mesh_file.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/spz.h"
 #include "tests/support/ksplat_file.h"
+#include "tests/support/mesh_shapes.h"
 #include "tests/support/photo_files.h"
 #include "tests/support/test_scene.h"
 #include "trainer/step/checkpoint.h"
@@ -274,6 +276,26 @@ void make_transforms(const fs::path& corpus) {
     write_file_atomic(corpus / "transforms/cameras", list);
 }
 
+void make_meshes(const fs::path& corpus) {
+    TriangleMesh mesh = box_mesh(glm::vec3(0), glm::vec3(1, 2, 3));
+    mesh.colour.assign(mesh.vertex_count(), glm::u8vec3(9, 8, 7));
+    mesh.normal.assign(mesh.vertex_count(), glm::vec3(0, 0, 1));
+    const auto add = [&](const std::string& name, const FileBytes& file) {
+        DARB_CHECK(parse_mesh(file, name).vertex_count() > 0, "{}", name);
+        write_file_atomic(corpus / "mesh" / name, file);
+    };
+    for (const char* name : {"box.ply", "box.obj", "box.glb"})
+        add(name, encode_mesh(mesh, name).file);
+    mesh.origin = {1e6, 0, 0};
+    add("far.ply", encode_mesh(mesh, "far.ply").file);
+    add("ascii.ply", bytes_of("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
+                              "property float y\nproperty float z\nelement face 1\n"
+                              "property list uchar int vertex_indices\nend_header\n"
+                              "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"));
+    add("quad.obj", bytes_of("v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 1 1 0 1 0 0\nv 0 1 0 1 0 0\n"
+                             "vn 0 0 1\nf 1//1 2//1 \\\n3//1 -1//1\n"));
+}
+
 void make_photos(const fs::path& corpus) {
     for (const auto& [name, file] : sample_photos()) {
         DARB_CHECK(decode_image(file, name).width > 0, "{}", name);
@@ -310,6 +332,7 @@ int main(int argc, char** argv) {
         darb::test::make_scenes(corpus);
         darb::test::make_colmap(corpus);
         darb::test::make_transforms(corpus);
+        darb::test::make_meshes(corpus);
         darb::test::make_photos(corpus);
         darb::test::make_checkpoints(corpus);
     } catch (const std::exception& e) {

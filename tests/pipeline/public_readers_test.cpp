@@ -8,11 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "engine/mesh/mesh_file.h"
 #include "engine/scene/dot_splat.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/sog.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/ksplat_file.h"
+#include "tests/support/mesh_shapes.h"
 #include "tests/support/run_command.h"
 #include "tests/support/splat_files.h"
 
@@ -110,6 +112,34 @@ TEST_F(PublicReaders, gltf_is_valid_and_says_what_it_should) {
             EXPECT_NEAR(seen["scale"][i].get<double>(), std::exp(shown.log_scale[i]), 1e-5);
             EXPECT_NEAR(seen["opacity"][i].get<double>(), opacity_of(shown.opacity_logit[i]), 1e-6);
         }
+    }
+}
+
+TEST_F(PublicReaders, meshes_as_gltf_are_valid) {
+    TriangleMesh mesh = sphere_mesh(0.7, 8, 9);
+    MeshTexture texture;
+    texture.image = {ImageU8(16, 8, 3), ImageU8(8, 16, 3)};
+    for (std::uint32_t f = 0; f < mesh.face_count(); ++f) {
+        texture.uv.push_back({glm::vec2(0), glm::vec2(1, 0), glm::vec2(0, 1)});
+        texture.page.push_back(f % 2);
+    }
+    std::vector<std::string> files = {scratch() / "t.glb", scratch() / "t t.gltf"};
+    for (const std::string& file : files) write_mesh(file, mesh, &texture);
+    mesh.colour.assign(mesh.vertex_count(), glm::u8vec3(1, 200, 30));
+    mesh.origin = {1e6, 2, 3};
+    files.push_back(scratch() / "colours.glb");
+    write_mesh(files.back(), mesh);
+    std::string command = fmt::format("node '{}/tests/support/public_readers.mjs' '{}'",
+                                      DARB_SOURCE_DIR, packages_.string());
+    for (const std::string& file : files) command += " '" + file + "'";
+    std::istringstream lines(out_of(command));
+    for (const std::string& file : files) {
+        std::string line;
+        ASSERT_TRUE(std::getline(lines, line)) << file;
+        const json seen = json::parse(line);
+        EXPECT_TRUE(seen["issues"].empty()) << file << "\n" << seen["issues"].dump(2);
+        EXPECT_EQ(seen["mode"], 4);
+        EXPECT_EQ(seen["attributes"].size(), 3u) << file;
     }
 }
 

@@ -25,7 +25,7 @@ for (const file of files) {
     });
     const document = await new NodeIO().read(file);
     const primitive = document.getRoot().listMeshes()[0].listPrimitives()[0];
-    const values = (name) => Array.from(primitive.getAttribute(name).getArray().slice(0, 6));
+    const values = (name) => Array.from(primitive.getAttribute(name)?.getArray().slice(0, 6) ?? []);
     const node = document.getRoot().listNodes()[0];
     console.log(JSON.stringify({
         issues: report.issues.messages.filter((issue) => !tooNew(issue)),

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -463,25 +462,8 @@ void add_convert(CLI::App& app, Action& action) {
 
 namespace {
 
-/// Reads "1,2,3" with exactly that many numbers.
-std::vector<double> numbers(const std::string& option, const std::string& text, size_t count) {
-    std::vector<double> values;
-    const char *at = text.data(), *end = at + text.size();
-    while (at <= end && values.size() <= count) {
-        double value = 0;
-        const auto [rest, error] = std::from_chars(at, end, value);
-        if (error != std::errc{} || !std::isfinite(value) || (rest != end && *rest != ',')) break;
-        values.push_back(value);
-        at = rest + 1;
-    }
-    if (values.size() != count || at != end + 1)
-        throw Error(option, fmt::format("'{}' is not {} numbers", text, count),
-                    "Write them with commas and without spaces.");
-    return values;
-}
-
 glm::dvec3 vector_of(const std::string& option, const std::string& text) {
-    const std::vector<double> v = numbers(option, text, 3);
+    const std::vector<double> v = numbers_from(option, text, 3);
     return {v[0], v[1], v[2]};
 }
 
@@ -513,7 +495,7 @@ void edit_scene(const SceneEdits& edits, SplatModel& model, std::FILE* say) {
         similarity.translation != glm::dvec3(0.0))
         transform_splats(similarity, model);
     if (!edits.crop.empty()) {
-        const std::vector<double> v = numbers("--crop", edits.crop, 6);
+        const std::vector<double> v = numbers_from("--crop", edits.crop, 6);
         const size_t lost = crop_splats({v[0], v[1], v[2]}, {v[3], v[4], v[5]}, model);
         report_dropped(say, "--crop " + edits.crop, lost, model.size());
     }

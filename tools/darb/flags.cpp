@@ -283,4 +283,20 @@ void refuse_no_numbers(const CLI::App& app) {
     for (const CLI::App* command : app.get_subcommands()) refuse_no_numbers(*command);
 }
 
+std::vector<double> numbers_from(const std::string& option, const std::string& text, size_t count) {
+    std::vector<double> values;
+    const char *at = text.data(), *end = at + text.size();
+    while (at <= end && values.size() <= count) {
+        double value = 0;
+        const auto [rest, error] = std::from_chars(at, end, value);
+        if (error != std::errc{} || !std::isfinite(value) || (rest != end && *rest != ',')) break;
+        values.push_back(value);
+        at = rest + 1;
+    }
+    if (values.size() != count || at != end + 1)
+        throw Error(option, fmt::format("'{}' is not {} numbers", text, count),
+                    "Write them with commas and without spaces.");
+    return values;
+}
+
 }  // namespace darb

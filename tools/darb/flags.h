@@ -104,6 +104,10 @@ PixelSize parse_size(const std::string& text);
 
 // Numbers and values of a command line, as typed or as kept by a run.
 
+/// `count` finite numbers with commas between them. Throws Error naming the option.
+std::vector<double> numbers_from(const std::string& option, const std::string& text,
+                                 std::size_t count);
+
 /// Throws Error for an option with the value "", which would count as not given.
 void refuse_empty_values(const std::vector<std::string>& arguments);
 

@@ -238,6 +238,8 @@ int render(RenderFlags flags) {
     Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     AllAround around(renderer, plan, flags, near_plane);
+    const DepthReading reading =
+        depth_reading_from_name(flags.depth.reading).value_or(usual_reading(model.kernel));
     DepthFiles depths(flags.depth);
     std::vector<double> frame_ms;
     for (const View& view : views) {
@@ -252,7 +254,7 @@ int render(RenderFlags flags) {
         plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
         const auto& file = files[frame_ms.size() - 1];
         write_png(file, to_8bit(image));
-        if (plan.on(EFFECT_DEPTH)) depths.write(file, renderer.render_depth());
+        if (plan.on(EFFECT_DEPTH)) depths.write(file, renderer.render_depth(reading));
     }
     written.wrote(outputs);
     depths.print_clipped();
@@ -307,6 +309,14 @@ void add_render(CLI::App& app, Action& action) {
                      "write depth beside the frames, NAME_depth: png (16 bits, 0 = nothing seen) "
                      "or npy (float32, world units); NAME_depth_colours.png is for people")
         ->check(CLI::IsMember({"png", "npy"}));
+    command
+        ->add_option("--depth-reading", flags->depth.reading,
+                     "where the surface of a pixel is: the depth at which half of its light is "
+                     "left, by how a splat takes it (front, solid, plane), or the mean of the "
+                     "centres (expected)")
+        ->check(CLI::IsMember(
+            std::vector<std::string>(std::begin(kDepthReadings), std::end(kDepthReadings))))
+        ->default_str("front; of kernels with rings plane");
     command->add_option("--depth-unit", flags->depth.unit, "world units of one step of a depth PNG")
         ->capture_default_str()
         ->check(above_zero());

@@ -14,6 +14,7 @@ namespace darb {
 
 struct DepthFlags {
     std::string format;   // png or npy; empty: none
+    std::string reading;  // of kDepthReadings; empty: the usual one of the kernel
     double unit = 0.001;  // world units of one step of a PNG
 };
 

@@ -84,7 +84,8 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
         ImageF image = renderer.render(camera, options.background);
         std::optional<DepthError> depth;
         if (!view.depth.empty() && renders_depth(options.accuracy))
-            depth = compare_depth(renderer.render_depth(), load_depth(view), options.depth_scale);
+            depth = compare_depth(renderer.render_depth(usual_reading(planned.kernel)),
+                                  load_depth(view), options.depth_scale);
         if (options.fit_exposure)
             image = apply_exposure(
                 fit_exposure(image, photo, options.background, options.alpha_is_mask), image, photo,

@@ -12,6 +12,7 @@
 #include "engine/core/error.h"
 #include "engine/core/text.h"
 #include "engine/plan/effect_plan.h"
+#include "trainer/options/memory_size.h"
 #include "trainer/options/strategy.h"
 
 namespace darb {
@@ -61,11 +62,9 @@ double real_number(const OptionRow& row, OptionKind kind, const std::string& tex
     double number = std::strtod(text.c_str(), &end);
     if (end == text.c_str()) throw bad_value(row, kind, text, "is no number");
     if (row.is_size) {
-        std::string unit(end);
-        unit.erase(0, unit.find_first_not_of(' '));
-        const auto bytes = unit_bytes(unit);
+        const auto bytes = parse_bytes(text);
         if (!bytes) throw bad_value(row, kind, text, "has no unit of bytes");
-        number *= *bytes;
+        number = *bytes;
     } else if (*end != '\0') {
         throw bad_value(row, kind, text, "is no number");
     }

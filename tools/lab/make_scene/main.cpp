@@ -5,6 +5,9 @@
 // make_scene depths FOLDER [SCALE]: also writes the true depths of all views beside the photos.
 // make_scene outdoors FOLDER [SCALE]: photos from near the ground, under clouds.
 // make_scene town FOLDER SIDE SCALE: SIDE x SIDE photos of a town of 16 blocks (town.h).
+// make_scene surface FOLDER: what is true of the still life's surface, without photos: surface.ply,
+// points that two training photos see, and shapes.json, its shapes (surface.h).
+// make_scene town-surface FOLDER SIDE: the same of the town, by SIDE x SIDE photos.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -12,6 +15,7 @@
 #include <filesystem>
 
 #include "tools/lab/make_scene/capture.h"
+#include "tools/lab/make_scene/surface.h"
 #include "tools/lab/make_scene/town.h"
 #include "tools/lab/make_scene/write_scene.h"
 
@@ -40,22 +44,47 @@ void make_still_life(const std::filesystem::path& folder, int scale, bool outdoo
     write_depths(folder / "off_path", away, take_depths(world, away));
 }
 
+/// Runs what make_scene is asked for; returns the exit status.
+template <class Make>
+int make(const Make& scene) {
+    try {
+        scene();
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "error: %s\n", error.what());
+        return 2;
+    }
+    return 0;
+}
+
+int usage() {
+    std::fprintf(
+        stderr,
+        "usage: make_scene FOLDER [SCALE]   (1 to 8: photos of 200 x 150 px times this)\n"
+        "       make_scene depths FOLDER [SCALE]   (with the true depths of the photos)\n"
+        "       make_scene outdoors FOLDER [SCALE]   (from near the ground, under clouds)\n"
+        "       make_scene town FOLDER SIDE SCALE   (SIDE x SIDE photos; SCALE from 0.2)\n"
+        "       make_scene surface FOLDER   (true surfaces of the still life, no photos)\n"
+        "       make_scene town-surface FOLDER SIDE   (those of the town)\n");
+    return 2;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
     using namespace darb::make_scene;
-    const bool is_town = argc == 5 && std::strcmp(argv[1], "town") == 0;
-    const int side = is_town ? std::atoi(argv[3]) : 2;
-    const double town_scale = is_town ? std::atof(argv[4]) : 1;
-    if (is_town && side >= 2 && side <= 100 && town_scale >= 0.2 && town_scale <= 8) {
-        try {
-            make_town(argv[2], side, town_scale);
-        } catch (const std::exception& error) {
-            std::fprintf(stderr, "error: %s\n", error.what());
-            return 2;
-        }
-        return 0;
-    }
+    const auto asks_for = [&](const char* what, int arguments) {
+        return argc == arguments && std::strcmp(argv[1], what) == 0;
+    };
+    const bool of_town = asks_for("town", 5) || asks_for("town-surface", 4);
+    const int side = of_town ? std::atoi(argv[3]) : 2;
+    const double town_scale = asks_for("town", 5) ? std::atof(argv[4]) : 1;
+    if (of_town && (side < 2 || side > 100 || town_scale < 0.2 || town_scale > 8)) return usage();
+    if (asks_for("town", 5)) return make([&] { make_town(argv[2], side, town_scale); });
+    if (asks_for("town-surface", 4))
+        return make([&] { write_surface(argv[2], town(), town_flight(side, 1), kTownSurface); });
+    if (asks_for("surface", 3))
+        return make(
+            [&] { write_surface(argv[2], still_life(), camera_path(), kStillLifeSurface); });
     const bool outdoors = argc >= 3 && std::strcmp(argv[1], "outdoors") == 0;
     const bool depths = argc >= 3 && std::strcmp(argv[1], "depths") == 0;
     if (outdoors || depths) {
@@ -63,20 +92,6 @@ int main(int argc, char** argv) {
         ++argv;
     }
     const int scale = argc == 3 ? std::atoi(argv[2]) : 1;
-    if (argc < 2 || argc > 3 || argv[1][0] == '-' || scale < 1 || scale > 8) {
-        std::fprintf(
-            stderr,
-            "usage: make_scene FOLDER [SCALE]   (1 to 8: photos of 200 x 150 px times this)\n"
-            "       make_scene depths FOLDER [SCALE]   (with the true depths of the photos)\n"
-            "       make_scene outdoors FOLDER [SCALE]   (from near the ground, under clouds)\n"
-            "       make_scene town FOLDER SIDE SCALE   (SIDE x SIDE photos; SCALE from 0.2)\n");
-        return 2;
-    }
-    try {
-        make_still_life(argv[1], scale, outdoors, depths);
-    } catch (const std::exception& error) {
-        std::fprintf(stderr, "error: %s\n", error.what());
-        return 2;
-    }
-    return 0;
+    if (argc < 2 || argc > 3 || argv[1][0] == '-' || scale < 1 || scale > 8) return usage();
+    return make([&] { make_still_life(argv[1], scale, outdoors, depths); });
 }

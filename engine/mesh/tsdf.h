@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// A surface out of depths: blocks of voxels around it, truncated signed distances in them on the
+// device, the zero level by marching tetrahedra, and colours from the views' pictures. Memory on
+// the device follows a range of blocks at a time; the result has the same bits for any number of
+// ranges, as each voxel depends on the depths alone and vertices are joined by the edge they are
+// on. Sources: Curless and Levoy 1996; docs/mesh.md.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "engine/mesh/depth_views.h"
+#include "engine/mesh/triangle_mesh.h"
+
+namespace darb {
+
+/// An axis-aligned box, world units; positions relative to SplatModel::origin.
+struct WorldBox {
+    glm::dvec3 low{0.0}, high{0.0};
+};
+
+struct TsdfOptions {
+    double voxel = 0;     // side, world units; 0: a pixel on the surface, in the median
+    int truncation = 4;   // half width of the band, voxels; 2 to 16
+    double farthest = 0;  // depths beyond it do not count; 0: 4 times the median depth
+    std::optional<WorldBox> bounds = {};       // what lies outside is left out
+    std::uint64_t working_bytes = 512u << 20;  // device memory of a range of blocks and its views
+};
+
+struct TsdfReport {
+    double voxel = 0, farthest = 0;  // as they were used, world units
+    std::size_t blocks = 0, ranges = 0;
+};
+
+/// A block of BLOCK_SIDE voxels a side by its place, in sides of a block.
+using BlockPlace = std::array<std::int32_t, 3>;
+
+/// The blocks that the rays of all pixels meet within the band around their depths, in Morton
+/// order. Pixels beyond `farthest`, or larger there than 8 voxels, have none.
+std::vector<BlockPlace> blocks_of_surface(const std::vector<DepthView>& views,
+                                          const TsdfOptions& options, const glm::dvec3& origin);
+
+/// Fills in the defaults that depend on the depths. Throws Error where no view has any.
+TsdfOptions with_defaults(TsdfOptions options, const std::vector<DepthView>& views);
+
+/// Positions, faces and normals of the zero level; origin: SplatModel::origin, to which positions
+/// are relative. Throws Error where no view sees a surface, and NoRoom where the result would not
+/// fit into the memory of the host, naming a voxel for which it would.
+TriangleMesh fuse_depths(Device& device, const std::vector<DepthView>& views,
+                         const glm::dvec3& origin, const TsdfOptions& options, TsdfReport& report,
+                         const MeshProgress& progress = {});
+
+/// Unit normals of the vertices: the mean of those of their faces, by area.
+void set_normals(TriangleMesh& mesh);
+
+/// Colours of the vertices from the views' pictures. voxel: as in the report; a vertex is on the
+/// surface of a view that is within two of it. working_bytes: as above.
+void bake_colours(Device& device, const std::vector<DepthView>& views, TriangleMesh& mesh,
+                  double voxel, std::uint64_t working_bytes, const MeshProgress& progress = {});
+
+}  // namespace darb
