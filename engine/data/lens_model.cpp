@@ -35,11 +35,11 @@ constexpr ModelRow kModels[] = {
     {"RADIAL_FISHEYE", 5, true},
     {"THIN_PRISM_FISHEYE", 12, false},
     {"RAD_TAN_THIN_PRISM_FISHEYE", 0, false},
-    {"SIMPLE_DIVISION", 0, true},
-    {"DIVISION", 0, false},
+    {"SIMPLE_DIVISION", 4, true},
+    {"DIVISION", 5, false},
     {"SIMPLE_FISHEYE", 3, true},
     {"FISHEYE", 4, false},
-    {"EUCM", 0, false},
+    {"EUCM", 6, false},
     {kPanorama, 2, false},
     {kFourRadial, 10, false},  // has no COLMAP id
 };
@@ -109,6 +109,7 @@ bool LensModel::distorted() const {
     if (panorama()) return true;
     if (model.ends_with("FISHEYE")) return true;
     if (model == "FOV") return std::abs(parameters[4]) > kSmallOmega;
+    if (model == "EUCM") return parameters[4] != 0;  // alpha; without it beta means nothing
     const auto first = parameters.begin() + (row.one_focal ? 3 : 4);
     return std::any_of(first, parameters.end(), [](double value) { return value != 0; });
 }
@@ -144,6 +145,13 @@ void check_lens(const LensModel& lens, const std::string& where) {
                                 lens.height, kMaxSize),
                     "Correct the size, or export the cameras again.");
     if (lens.panorama()) check_panorama(lens, where);
+    if (lens.model == "EUCM" &&
+        !(lens.parameters[4] >= 0 && lens.parameters[4] <= 1 && lens.parameters[5] > 0))
+        throw Error(where,
+                    fmt::format("alpha {:g} and beta {:g} of EUCM are not between 0 and 1, and "
+                                "positive",
+                                lens.parameters[4], lens.parameters[5]),
+                    "Calibrate the cameras again.");
 }
 
 LensModel scale_lens(const LensModel& lens, int width, int height) {
@@ -202,8 +210,16 @@ Lens::Lens(const LensModel& model) {
     } else if (model.model == "OPENCV_FISHEYE") {
         k_ = {p[0], p[1], p[2], p[3]};
     } else if (model.model == "FOV") {
-        omega_ = p[0];
-        if (std::abs(omega_) > kSmallOmega) front_ = Front::fov;
+        omega_ = std::abs(p[0]);
+        if (omega_ > kSmallOmega) front_ = Front::fov;
+    } else if (model.model == "SIMPLE_DIVISION" || model.model == "DIVISION") {
+        alpha_ = 0.5;
+        beta_ = -4 * p[0];
+        if (beta_ != 0) front_ = Front::unified;
+    } else if (model.model == "EUCM") {
+        alpha_ = p[0];
+        beta_ = p[1];
+        if (alpha_ != 0) front_ = Front::unified;
     } else if (row.parameters >= 8) {  // OPENCV, FULL_OPENCV, THIN_PRISM_FISHEYE, FOUR_RADIAL
         k_ = {p[0], p[1], 0, 0};
         p1_ = p[2];
@@ -249,6 +265,8 @@ double Lens::find_fold() const {
     // 84 degrees off the axis in the plane, 180 in theta.
     const double limit = front_ == Front::equidistant ? 2 * kHalfPi : 10.0;
     if (front_ == Front::fov) return limit;
+    // With beta below 0 the root ends at r = 1 / sqrt(-beta), where w = 2 r.
+    if (front_ == Front::unified && beta_ < 0) return std::min(limit, 1.998 / std::sqrt(-beta_));
     for (double r = 0; r < limit; r += kStep)
         for (int i = 0; i < kDirections; ++i) {
             const double angle = 4 * kHalfPi * i / kDirections;
@@ -261,6 +279,10 @@ double Lens::find_fold() const {
     return limit;
 }
 
+double Lens::unified_factor(double square) const {
+    return 1 / (alpha_ * std::sqrt(std::max(0.0, 1 + beta_ * square)) + 1 - alpha_);
+}
+
 glm::dvec2 Lens::project(glm::dvec2 ray) const {
     const double r = std::hypot(ray.x, ray.y);
     if (front_ == Front::fov) {
@@ -269,6 +291,7 @@ glm::dvec2 Lens::project(glm::dvec2 ray) const {
         return focal * ray * factor + principal;
     }
     if (front_ == Front::equidistant && r > 1e-12) ray *= std::atan(r) / r;
+    if (front_ == Front::unified) ray *= unified_factor(r * r);
     return focal * distort(ray).value + principal;
 }
 
@@ -281,6 +304,10 @@ LensTerms Lens::terms(glm::dvec2 size) const {
     if (front_ == Front::fov) {
         terms.front_tan = 2 * std::tan(0.5 * omega_);
         terms.front_scale = omega_;
+    }
+    if (front_ == Front::unified) {
+        terms.front_tan = beta_;
+        terms.front_scale = -alpha_;
     }
     terms.k = k_;
     terms.d = d_;
@@ -305,6 +332,8 @@ LensTerms Lens::terms(glm::dvec2 size) const {
 
 bool Lens::valid(glm::dvec2 ray) const {
     const double r = std::hypot(ray.x, ray.y);
+    if (front_ == Front::unified)
+        return 1 + beta_ * r * r > 0 && r * unified_factor(r * r) <= fold_;
     return (front_ == Front::equidistant ? std::atan(r) : r) <= fold_;
 }
 
@@ -317,6 +346,15 @@ std::optional<glm::dvec2> Lens::unproject(glm::dvec2 pixel) const {
         if (r < 1e-12) return target * (omega_ / (2 * std::tan(0.5 * omega_)));
         if (!(r * std::abs(omega_) < kHalfPi - 1e-9)) return std::nullopt;
         return target * (std::tan(r * omega_) / (2 * std::tan(0.5 * omega_) * r));
+    }
+    if (front_ == Front::unified) {
+        const double square = glm::dot(target, target);
+        const double root = 1 - (2 * alpha_ - 1) * beta_ * square;
+        if (!(root >= 0) || !(square <= fold_ * fold_)) return std::nullopt;
+        const double z =
+            (1 - alpha_ * alpha_ * beta_ * square) / (alpha_ * std::sqrt(root) + 1 - alpha_);
+        if (!(z > 1e-6)) return std::nullopt;
+        return target / z;
     }
     glm::dvec2 w = target * std::min(1.0, fold_ / std::max(1e-12, glm::length(target)));
     Distorted at = distort(w);
@@ -427,7 +465,8 @@ Sample sample(const ImageU8& rgba, glm::dvec2 pixel) {
 }  // namespace
 
 bool too_wide_to_undistort(const LensModel& model) {
-    if (!model.distorted() || !(model.model.ends_with("FISHEYE") || model.model == "FOV"))
+    if (!model.distorted() || !(model.model.ends_with("FISHEYE") || model.model == "FOV" ||
+                                model.model == "EUCM" || model.model.ends_with("DIVISION")))
         return false;
     const Lens lens(model);
     const glm::dvec2 middle = glm::clamp(lens.principal, glm::dvec2(0.5),

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Lens: the camera models of COLMAP 3.8, and the equidistant ones of later versions, as one
-// function of a ray and its inverse.
+// Lens: the camera models of COLMAP 3.8 and the equidistant, division and unified ones of later
+// versions, as one function of a ray and its inverse.
 // Every model is a pinhole after a distortion of the plane z = 1,
 //   w' = w (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) / (1 + d1 r^2 + d2 r^4 + d3 r^6)
 //        + tangential (p1, p2) + thin prism (s1, s2),   r = |w|,
 // with w the ray itself or, for the fisheye models, the ray at distance theta; FOV has its own
-// form. Source: COLMAP 3.8, src/base/camera_models.h; Weng et al. 1992; Devernay and Faugeras 2001.
+// form. EUCM has w = ray / (alpha sqrt(1 + beta r^2) + 1 - alpha), r = |ray|; DIVISION is that with
+// alpha = 1/2 and beta = -4 k. Source: COLMAP 3.8, src/base/camera_models.h; Weng et al. 1992; Devernay and Faugeras 2001.
 #pragma once
 
 #include <array>
@@ -63,18 +64,19 @@ class Lens {
     glm::dvec2 focal{1.0}, principal{0.0};  // px
 
   private:
-    enum class Front { plane, equidistant, fov };
+    enum class Front { plane, equidistant, fov, unified };
     struct Distorted {
         glm::dvec2 value;
         glm::dmat2 jacobian;  // column major: [c][r] = d value_r / d w_c
     };
     Distorted distort(glm::dvec2 w) const;
     double find_fold() const;
+    double unified_factor(double square) const;  // w over the ray of this squared length
 
     Front front_ = Front::plane;
     std::array<double, 4> k_{};
     std::array<double, 3> d_{};
-    double p1_ = 0, p2_ = 0, s1_ = 0, s2_ = 0, omega_ = 0;
+    double p1_ = 0, p2_ = 0, s1_ = 0, s2_ = 0, omega_ = 0, alpha_ = 0, beta_ = 0;
     double fold_ = 0;  // largest |w| up to which distort is one to one
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "engine/reference/reference_lens.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace darb::reference {
@@ -36,6 +37,17 @@ Radial<T> atan_over(T t) {
 template <class T>
 Radial<T> front_factor(const LensTerms& lens, T square) {
     if (lens.front_scale == 0) return {};
+    if (lens.front_scale < 0) {  // a = 1 / (alpha q + 1 - alpha), q = sqrt(1 + beta s)
+        const T alpha = T(-lens.front_scale), beta = T(lens.front_tan);
+        const T q = std::sqrt(std::max(1 + beta * square, T(1e-6)));
+        const T bottom = alpha * q + 1 - alpha;
+        const T first = alpha * beta / (2 * q), second = -alpha * beta * beta / (4 * q * q * q);
+        Radial<T> a;
+        a.value = 1 / bottom;
+        a.first = -first / (bottom * bottom);
+        a.second = (2 * first * first / bottom - second) / (bottom * bottom);
+        return a;
+    }
     const T c2 = T(lens.front_tan * lens.front_tan);
     const T scale = T(lens.front_tan / lens.front_scale);
     const Radial<T> a = atan_over(c2 * square);

@@ -10,10 +10,12 @@
 namespace darb {
 
 /// Lens distortion of the plane z = 1. A ray u = (x/z, y/z) first becomes w = u a(|u|), with
-/// a(r) = atan(front_tan r) / (front_scale r) (fisheye and FOV; w = u where front_scale is 0); then
+/// a(r) = atan(front_tan r) / (front_scale r) (fisheye and FOV; w = u where front_scale is 0), or
+/// with a negative front_scale a(r) = 1 / (alpha sqrt(1 + beta r^2) + 1 - alpha), alpha =
+/// -front_scale and beta = front_tan (EUCM and the division models); then
 ///   w' = w (1 + k0 s + .. + k3 s^4) / (1 + d0 s + d1 s^2 + d2 s^3), s = |w|^2,
 ///        + tangential (2 p0 x y + p1 (s + 2 x^2), 2 p1 x y + p0 (s + 2 y^2)) + prism s.
-/// Source: the camera models of COLMAP 3.8, see engine/data/lens_model.h.
+/// Source: the camera models of COLMAP, see engine/data/lens_model.h.
 struct LensTerms {
     bool active = false;  // false: a pinhole
     double front_tan = 0, front_scale = 0;

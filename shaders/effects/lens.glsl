@@ -8,6 +8,11 @@
 vec3 lens_front(CameraData camera, float square) {
     const float c = camera.lens_front.x, w = camera.lens_front.y;
     if (w == 0.0) return vec3(1.0, 0.0, 0.0);
+    if (w < 0.0) {  // EUCM and the division models: 1 / (alpha sqrt(1 + beta s) + 1 - alpha)
+        const float q = sqrt(max(1.0 + c * square, 1e-6)), a = 1.0 / (1.0 - w * (q - 1.0));
+        const float d1 = -0.5 * w * c / q, d2 = 0.25 * w * c * c / (q * q * q);
+        return vec3(a, -d1 * a * a, (2.0 * d1 * d1 * a - d2) * a * a);
+    }
     const float t = c * c * square;  // below: atan(y) / y with t = y^2, and its derivatives by t
     vec3 phi = vec3(0.0);
     if (t < 0.15) {

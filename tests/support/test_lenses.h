@@ -16,7 +16,8 @@ inline std::vector<std::pair<std::string, LensTerms>> test_lenses() {
     plain.fold = 3;
     plain.ray_min = glm::dvec2(-0.7, -0.6);
     plain.ray_max = glm::dvec2(0.8, 0.5);
-    LensTerms opencv = plain, full = plain, fisheye = plain, fov = plain, prism = plain;
+    LensTerms opencv = plain, full = plain, fisheye = plain, fov = plain, prism = plain,
+              unified = plain, division = plain;
     opencv.k = {-0.2, 0.06, 0, 0};
     opencv.tangential = glm::dvec2(0.01, -0.015);
     full.k = {0.3, -0.1, 0.02, 0};
@@ -30,7 +31,14 @@ inline std::vector<std::pair<std::string, LensTerms>> test_lenses() {
     prism.k = {-0.03, 0.01, -0.002, 0.0005};
     prism.tangential = glm::dvec2(0.004, 0.006);
     prism.prism = glm::dvec2(0.01, -0.02);
-    return {{"OPENCV", opencv},
+    unified.front_scale = -0.6;  // -alpha
+    unified.front_tan = 1.2;     // beta
+    division.front_scale = -0.5;
+    division.front_tan = -0.6;  // k = 0.15
+    division.fold = 2.5;
+    return {{"EUCM", unified},
+            {"DIVISION", division},
+            {"OPENCV", opencv},
             {"FULL_OPENCV", full},
             {"OPENCV_FISHEYE", fisheye},
             {"FOV", fov},

@@ -45,18 +45,6 @@ Error bad_value(const OptionRow& row, OptionKind kind, const std::string& text,
                              usual.empty() ? "" : "; default: " + usual));
 }
 
-/// Bytes for each unit that sizes have, powers of 1,000, with an i of 1,024.
-std::optional<double> unit_bytes(std::string unit) {
-    unit = lower(unit);
-    if (unit.ends_with('b')) unit.pop_back();
-    const bool binary = unit.ends_with('i');
-    if (binary) unit.pop_back();
-    if (unit.empty()) return binary ? std::nullopt : std::optional<double>(1);
-    const std::size_t power = std::string("kmgt").find(unit);
-    if (unit.size() != 1 || power == std::string::npos) return std::nullopt;
-    return std::pow(binary ? 1024.0 : 1000.0, static_cast<double>(power + 1));
-}
-
 double real_number(const OptionRow& row, OptionKind kind, const std::string& text) {
     char* end = nullptr;
     double number = std::strtod(text.c_str(), &end);

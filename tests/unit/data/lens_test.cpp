@@ -33,8 +33,11 @@ std::vector<LensModel> all_models() {
         make("RADIAL_FISHEYE", {300, 321, 239, -0.02, 0.003}),
         make("THIN_PRISM_FISHEYE",
              {300, 305, 321, 239, 0.01, -0.002, 0.001, -0.001, 0.0005, 0.0001, 0.002, -0.002}),
+        make("SIMPLE_DIVISION", {500, 321, 239, -0.2}),
+        make("DIVISION", {500, 510, 321, 239, 0.15}),
         make("SIMPLE_FISHEYE", {300, 321, 239}),
-        make("FISHEYE", {300, 305, 321, 239})};
+        make("FISHEYE", {300, 305, 321, 239}),
+        make("EUCM", {300, 305, 321, 239, 0.62, 1.1})};
 }
 
 TEST(Lens, four_radial_terms_stand_in_the_numerator) {
@@ -59,7 +62,7 @@ TEST(Lens, every_model_of_colmap_is_known_by_id_and_name) {
             EXPECT_THROW(Lens({name, {640, 320}, 640, 320}), Error);
             continue;
         }
-        if (id > 10 && id != 14 && id != 15) {
+        if (id == 11) {
             const std::string error = error_of([&] { check_lens({name, {}, 640, 480}, "camera"); });
             EXPECT_NE(error.find(name + " is not read"), std::string::npos) << error;
             EXPECT_NE(error.find("image_undistorter"), std::string::npos) << error;
@@ -113,6 +116,10 @@ TEST(Lens, known_values_by_hand) {
     expect(make("OPENCV", {100, 100, 0, 0, 0, 0, 0.1, 0}), 32.4, 45.7);
     expect(make("OPENCV", {100, 100, 0, 0, 0, 0, 0, 0.1}), 34.3, 42.4);
     expect(make("FULL_OPENCV", {100, 100, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0}), 15, 20);  // / (1 + 4 r^2)
+    // The undistorted point is the distorted one over 1 + k r^2: 40 / (1 + 0.75 * 4 / 9) = 30.
+    expect(make("SIMPLE_DIVISION", {100, 0, 0, 0.75}), 40, 160.0 / 3);
+    expect(make("DIVISION", {100, 50, 0, 0, 0.75}), 40, 80.0 / 3);
+    expect(make("EUCM", {100, 100, 0, 0, 0.5, 5}), 24, 32);  // 1 / (0.5 * 1.5 + 0.5)
     const double theta = std::atan(0.5);
     expect(make("OPENCV_FISHEYE", {100, 100, 0, 0, 0, 0, 0, 0}), 60 * theta, 80 * theta);
     const double bent = theta * (1 + 0.1 * theta * theta);
