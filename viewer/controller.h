@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Controller: what was asked. Keys, the pointer and its tools act on the document at once. Requests
-// of theirs, of the panels and of the window are carried out by the document and the painter, in
-// order.
+// Controller: what was asked. Keys, the pointer and its tools act on the document at once. Their
+// requests, and those from the panels and the window, are carried out in order by the document and
+// the painter.
 #pragma once
 
 #include <filesystem>

@@ -67,7 +67,7 @@ struct FrameTimes {
 struct MeasuredChoice {
     int row = 0, choice = 0;  // viewer/switches.h
     double ms = 0;            // device time of the picture's passes
-    double psnr_db = 0;       // of its 8-bit picture against the exact one; infinity where equal
+    double psnr_db = 0;       // its 8-bit picture against the exact one; infinity where equal
 };
 
 /// Shares from 0 to 1; negative where no such work goes on.

@@ -138,7 +138,7 @@ class SplatPicture {
         int degree = -1;  // the last picture's degree, which has a pipeline of its own
         bool fresh = true;
     };
-    struct Image {  // of a pane; the previous one is seen where a frame has no room
+    struct Image {  // one pane's; the previous one is seen where a frame has no room
         Buffer now, before;
         glm::ivec2 size{0}, size_before{0};  // px
     };
@@ -203,7 +203,7 @@ class SplatPicture {
     Bounds bounds_;
     std::map<int, Slot> slots_;      // pane p has 2 p at rest and 2 p + 1 in motion
     std::map<int, Image> images_;    // by pane; kRehearsal for what nobody sees
-    std::uint64_t most_pixels_ = 0;  // of any picture so far
+    std::uint64_t most_pixels_ = 0;  // the largest picture so far
     Buffer nothing_;                 // stands in for a photo or a previous picture
     bool compiled_ = false;
     StartedPicture rendered_;  // the last picture that was waited for

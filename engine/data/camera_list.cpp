@@ -100,9 +100,11 @@ void read_path_pose(const json& frame, const std::string& where, Camera& camera)
                     fmt::format("camera_to_world has {} numbers, not 16 or 12", numbers.size()),
                     kExportPath);
     glm::dmat3 axes;  // y up and z backwards, as in OpenGL
-    for (std::size_t r = 0; r < 3; ++r)
-        for (std::size_t c = 0; c < 3; ++c)
-            axes[static_cast<int>(c)][static_cast<int>(r)] = (c == 0 ? 1 : -1) * numbers[4 * r + c];
+    for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) {
+            const int entry = 4 * r + c;
+            axes[c][r] = (c == 0 ? 1 : -1) * numbers[static_cast<std::size_t>(entry)];
+        }
     const glm::dvec3 centre(numbers[3], numbers[7], numbers[11]);
     remove_scale(axes);
     camera.rotation = glm::transpose(checked_rotation(axes, where));

@@ -33,13 +33,13 @@ std::uint8_t colour_byte(double value) {
 // Which columns of element vertex a cloud takes, and what their values mean.
 struct CloudColumns {
     int position[3] = {}, colour[3] = {}, dc[3] = {};  // -1: there is none
-    bool is_scene = false;                             // of splats, whose f_dc is the colour
+    bool is_scene = false;                             // has splats, whose f_dc is the colour
     bool uncoloured = false;
     bool floats[3] = {};           // colours of 0 to 1 or 0 to 255: the largest of all says which
     double factor[3] = {1, 1, 1};  // what else a value is multiplied by, to 0 .. 255
     bool any_floats() const { return floats[0] || floats[1] || floats[2]; }
 
-    /// Of a row, 0 to 255, but for floats of 0 to 1.
+    /// The colour of a row: 0 to 255, or 0 to 1 where it is stored in such floats.
     double colour_of(const double* values, int channel) const {
         if (is_scene) return 255 * colour_of_dc(values[dc[channel]]);
         return colour[channel] < 0 ? kMidGrey : values[colour[channel]] * factor[channel];

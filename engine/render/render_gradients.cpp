@@ -41,9 +41,11 @@ CameraGradient camera_gradient(const Camera& camera, const CameraTotals& sum) {
     g.d_translation = -(camera.rotation * d_centre);
     const glm::dvec3 centre = camera.centre();
     for (int row = 0; row < 3; ++row)
-        for (int column = 0; column < 3; ++column)
-            g.d_rotation[column][row] = sum[static_cast<std::size_t>(3 * row + column)] +
-                                        g.d_translation[row] * centre[column];
+        for (int column = 0; column < 3; ++column) {
+            const int entry = 3 * row + column;
+            g.d_rotation[column][row] =
+                sum[static_cast<std::size_t>(entry)] + g.d_translation[row] * centre[column];
+        }
     g.d_fx = sum[9];
     g.d_fy = sum[10];
     g.d_cx = sum[11];

@@ -278,7 +278,7 @@ TEST(Convert, a_file_that_is_there_is_replaced_by_the_same_scene_alone) {
     const std::string a = scene_file("a.ply", sample_model(0, 30)),
                       b = scene_file("b.ply", sample_model(0, 40)),
                       out = scratch_file("once.splat"), to = " " + out + " --no-measure",
-                      there = "is there already";
+                      there = "already exists";
     ASSERT_EQ(darb("convert " + a + to).code, 0);
     EXPECT_EQ(darb("convert " + a + to).code, 0) << "the same again";
     save_splats(a, SplatFormat::ply, sample_model(0, 31));

@@ -19,7 +19,7 @@
 namespace darb {
 
 struct LevelFlags {
-    std::size_t splats = 0;       // of the first level; 0: by share
+    std::size_t splats = 0;       // splats of the first level; 0: by share
     std::optional<double> share;  // how many splats each level keeps of the previous one
     int levels = 0;               // 0: one file with the output's name
     std::filesystem::path refine;

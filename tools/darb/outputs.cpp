@@ -81,7 +81,7 @@ void refuse_to_lose_work(const fs::path& output) {
     const bool picture = has_extension(output, ".png") || has_extension(output, ".jpg") ||
                          has_extension(output, ".jpeg");
     if (work == "a picture" && picture) return;
-    throw Error(output.string(), fmt::format("is there already, and is {}", work),
+    throw Error(output.string(), fmt::format("already exists, and is {}", work),
                 "Name another file to write, or delete it first.");
 }
 
@@ -232,8 +232,8 @@ void WrittenFiles::check(const Paths& outputs) const {
             continue;
         throw Error(output.string(),
                     sources_.empty()
-                        ? "is there already, and was not written by darb"
-                        : "is there already, and was not written by darb from this scene",
+                        ? "already exists, and was not written by darb"
+                        : "already exists, and was not written by darb from this scene",
                     "Name another file to write, or add --force to replace it.");
     }
 }

@@ -19,10 +19,10 @@ struct Forecast {
     std::uint32_t splats = 0;         // at the end, within options.max_memory_bytes
     bool falls = false;               // the first round takes most of the start, which is random
     double start_ms = 0, end_ms = 0;  // an iteration at these counts; 0: not measured
-    std::vector<double> ramp_ms;      // of each of ramp_steps(), at the count at the start, as far
-                                      // as they were measured
-    double seconds = 0;               // the whole run; 0: not measured
-    double start_intersections = 0;   // a splat, of the photos that the start sees; 0: as seconds
+    // Each of ramp_steps() at the count at the start, as far as they were measured.
+    std::vector<double> ramp_ms;
+    double seconds = 0;              // the whole run; 0: not measured
+    double start_intersections = 0;  // a splat, of the photos that the start sees; 0: as seconds
     // At the end. Exact is what the plan makes of it; splats, intersections and degree are as
     // uncertain as the constants in the .cpp.
     MemoryDemand demand;

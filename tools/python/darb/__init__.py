@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: MIT
 """darb: 3D splats with a choice of kernel, on any Vulkan device.
 
-Arrays in, arrays out: numpy arrays of float32, or whatever has DLPack or the buffer protocol and
-lies on the host. darb.torch has the same with gradients for PyTorch.
+Arrays in, arrays out: numpy arrays of float32, or whatever supports DLPack or the buffer protocol
+and lies on the host. darb.torch does the same with gradients for PyTorch.
 
-    rasterize           splats and cameras to pictures
-    rasterize_backward  what a loss of the pictures says of every input
+    rasterize           turns splats and cameras into pictures
+    rasterize_backward  the gradients of a loss of the pictures, for every input
     Scene, Dataset      splat files; photos with their cameras
     Trainer             `darb train`, step by step
-    Kernel              a reconstruction kernel of one's own
+    Kernel              a reconstruction kernel of your own
     psi, sim1d          a kernel's correction factor; signals as sums of kernels
-    plan, devices       the effects that a scene calls for; the Vulkan devices
+    plan, devices       the effects that a scene needs; the Vulkan devices
     Error               what was wrong, where, and what to do
-    NoRoom, DeviceLost  kinds of it that a script may answer: less memory, another device
+    NoRoom, DeviceLost  kinds of it that a script can react to: less memory, another device
 
-Every mistake is a darb.Error, which is a ValueError; NoRoom is a MemoryError and DeviceLost a RuntimeError as well. Long calls let other threads run and end with
-Ctrl-C. A Device is used by one call at a time; others wait.
+Every mistake is a darb.Error, which is a ValueError; NoRoom is also a MemoryError, and DeviceLost a
+RuntimeError. Long calls let other threads run and end with Ctrl-C. A Device is used by one call at a
+time, and others wait.
 """
 
 import atexit as _atexit
@@ -54,9 +55,9 @@ _devices = {}
 
 
 def device(select=""):
-    """The device of that number or of which that is a part of the name, opened once.
+    """The device with that number, or with that part of its name, opened once.
 
-    "" is the best usable one, as `darb devices` lists them. A darb.Device is given back as it is.
+    "" is the best usable one, as `darb devices` lists them. A darb.Device is returned as it is.
     """
     if isinstance(select, Device):
         return select
@@ -66,7 +67,7 @@ def device(select=""):
 
 
 def _close():
-    """Lets go of the devices before the interpreter ends: they keep their pipeline caches."""
+    """Releases the devices before the interpreter ends, so that they keep their pipeline caches."""
     _devices.clear()
 
 
@@ -85,33 +86,33 @@ def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh
               viewmats, Ks, width, height, kernel=None, footprint=None, background=None,
               sh_degree=None, antialiased=None, near=0.2, accuracy="balanced", depth=False,
               device=""):
-    """Pictures of splats through C cameras -> (image, alpha, info).
+    """Draws pictures of splats through C cameras -> (image, alpha, info).
 
-    Splats, N of them, float32 in C order:
-        means      [N, 3]  world units; or a Scene in place of all arrays of splats, whose splats
+    N splats, float32 in C order:
+        means      [N, 3]  world units; or a Scene instead of all arrays of splats, whose splats
                            stay on the device until they change
         quats      [N, 4]  w x y z, of any norm
         scales     [N, 3]  standard deviations, world units, not logarithms
         opacities  [N]     0 to 1
-        colors     [N, 3]  RGB of any sign, as they are: nothing is added and nothing clamped
+        colors     [N, 3]  RGB of any sign, used as they are: nothing is added or clamped
         sh         [N, K, 3]  harmonics instead, K = 1, 4, 9 or 16, the first band first:
                            colour = max(0, 0.5 + sum over k of sh[k] Y_k(direction)), as 3DGS has it
-        shapes     [N]     of kernels that learn one (docs/kernels.md): of "beta" ln(b/4); 0
-                           of all by default
+        shapes     [N]     for kernels that learn one (docs/kernels.md), such as ln(b/4) for "beta";
+                           0 by default
     Cameras, float32 or float64:
         viewmats   [C, 4, 4]  world to camera, rigid; x right, y down, z forward
         Ks         [C, 3, 3]  pinholes, px; the centre of the top left pixel is (0.5, 0.5)
         width, height         px
     kernel: a name of kernel_names() or a Kernel ("gaussian"). footprint: "psi" or "exact".
-    background: [3] or [C, 3], black by default. sh_degree: the most that is used.
+    background: [3] or [C, 3], black by default. sh_degree: the highest degree that is used.
     antialiased: opacities are compensated for the low-pass of 0.3 px^2, as Mip-Splatting does.
     near: splats up to this z are left out. accuracy: "fast", "balanced" or "exact", a preset of
-    `darb render --accuracy`. depth: info["depth"], too. device: as darb.device takes it.
+    `darb render --accuracy`. depth: also fills info["depth"]. device: as for darb.device.
 
     image  [C, H, W, 3] float32, not clamped.
     alpha  [C, H, W]    float32, 1 - transmittance.
     info   a dict: "visible" and "intersections" (of splats and tiles) [C]; "device_ms", the time
-           of the passes, and "frame_ms", that and the way to the host; "depth" [C, H, W], the
+           of the passes, and "frame_ms", which adds the way to the host; "depth" [C, H, W], the
            expected z, 0 where nothing is seen; "picture", its number for rasterize_backward.
     """
     return _darb.rasterize(
@@ -124,19 +125,20 @@ def rasterize_backward(d_image, d_alpha=None, *, means, quats=None, scales=None,
                        colors=None, sh=None, shapes=None, viewmats, Ks, width, height, kernel=None,
                        footprint=None, background=None, sh_degree=None, antialiased=None, near=0.2,
                        accuracy="balanced", device="", camera=False, picture=0):
-    """What a loss of rasterize's pictures says of its inputs: a dict of gradients.
+    """The gradients of a loss of rasterize's pictures for its inputs, as a dict.
 
-    d_image [C, H, W, 3] is dL/d(image), d_alpha [C, H, W] or None dL/d(alpha), float32. The other
-    arguments are those of rasterize. "means", "quats", "scales", "opacities", "colors" or "sh", and
-    "shapes" of kernels that learn one are as large as the inputs and added over the cameras, "backgrounds"
-    is [C, 3]. A Scene has "log_scales" and "opacity_logits" instead of scales and opacities.
+    d_image [C, H, W, 3] is dL/d(image), and d_alpha [C, H, W] or None is dL/d(alpha), float32. The
+    other arguments are those of rasterize. "means", "quats", "scales", "opacities", "colors" or "sh",
+    and "shapes" for kernels that learn one have the shapes of the inputs and are summed over the
+    cameras; "backgrounds" is [C, 3]. A Scene has "log_scales" and "opacity_logits" instead of scales
+    and opacities.
 
-    With camera "viewmats" [C, 4, 4] and "Ks" [C, 3, 3], too: their numbers are taken freely, as
-    gsplat does; of a rotation that counts which is along rotations.
-    "means_ndc_norm" [N] is |dL/d(projected mean)| in units of half the picture's sides, "shown" [N]
-    in how many pictures a splat is; density control goes by the two. "not_finite": splats whose
-    gradients left float32; they are 0. picture: info["picture"] of the call of rasterize with the
-    same arguments: of a single camera it need not be drawn again.
+    With camera there are also "viewmats" [C, 4, 4] and "Ks" [C, 3, 3]. Their numbers are treated as
+    independent, as gsplat does; for a rotation only the part along rotations counts.
+    "means_ndc_norm" [N] is |dL/d(projected mean)| in units of half the picture's sides, and "shown"
+    [N] tells in how many pictures a splat is seen; density control uses these two. "not_finite"
+    counts splats whose gradients exceeded float32; they are 0. picture: info["picture"] of the call
+    of rasterize with the same arguments, so that a single camera need not be drawn again.
     """
     return _darb.rasterize_backward(
         _device(device),
@@ -150,12 +152,12 @@ _atexit.register(_close)
 
 
 def devices():
-    """Every Vulkan device, best first: a list of dicts with name, driver, type and limits."""
+    """All Vulkan devices, best first: a list of dicts with name, driver, type and limits."""
     return _darb.devices()
 
 
 def kernel_names():
-    """The names of the kernels, as on the command line, and of those that were made since."""
+    """The names of the kernels, as on the command line, including those made in this process."""
     return _darb.kernel_names()
 
 
@@ -172,20 +174,20 @@ Scene.__doc__ = """A splat scene in memory.
     image, alpha, info = scene.render(viewmats, Ks, 640, 480)
     scene.write("copy.spz")                 # any format that `darb convert` writes to one file
 
-Attributes are read-only looks at the scene's own float32; assign an array of the same shape to
+Attributes are read-only views of the scene's own float32; assign an array of the same shape to
 change one: means [N, 3], log_scales [N, 3], quats [N, 4] (w x y z), opacity_logits [N], sh_dc
-[N, 3], sh_rest [N, K - 1, 3], shapes [N] (of a kernel that learns one, else None). kernel, footprint and antialiased say
-how it is drawn. The splats
-stay on the device between calls until one is assigned. A notebook shows a scene as a picture.
+[N, 3], sh_rest [N, K - 1, 3], shapes [N] (for a kernel that learns one, else None). kernel,
+footprint and antialiased say how it is drawn. The splats stay on the device between calls until
+one is assigned. A notebook shows a scene as a picture.
 """
 
 
 def _scene_from_arrays(means, quats, scales, opacities, *, sh, shapes=None, kernel="gaussian",
                        footprint="psi", antialiased=False):
-    """A Scene of arrays as darb.rasterize takes them: scales and opacities themselves.
+    """Makes a Scene from arrays as darb.rasterize takes them, with scales and opacities themselves.
 
-    Opacities are clamped to 1e-6 and 1 - 1e-6, scales to 1e-8 and more, as files hold logits and
-    logarithms.
+    Opacities are clamped to 1e-6 and 1 - 1e-6, and scales to 1e-8 and more, because files hold
+    logits and logarithms.
     """
     return _scene_of_arrays({
         "means": means, "quats": quats, "scales": scales, "opacities": opacities, "sh": sh,
@@ -193,12 +195,12 @@ def _scene_from_arrays(means, quats, scales, opacities, *, sh, shapes=None, kern
 
 
 def _scene_render(self, viewmats, Ks, width, height, **options):
-    """darb.rasterize of this scene -> (image, alpha, info)."""
+    """darb.rasterize for this scene -> (image, alpha, info)."""
     return rasterize(self, viewmats=viewmats, Ks=Ks, width=width, height=height, **options)
 
 
 def _scene_picture(self, size=480):
-    """A look at the scene along z, [size, size, 3] float32."""
+    """A view of the scene along z, [size, size, 3] float32."""
     means = _np.asarray(self.means, dtype=_np.float64)
     if len(means) == 0:
         return _np.zeros((size, size, 3), _np.float32)
@@ -255,9 +257,9 @@ Dataset.__doc__ = """Photos with their cameras: a COLMAP project, transforms.jso
 
 
 def _dataset_read(path, *, resolution=-1, eval=False, images="images", lens="auto"):
-    """Reads the cameras and points; the photos when they are asked for.
+    """Reads the cameras and points; photos are read when they are asked for.
 
-    resolution: 1, 2, 4, 8 divide, above 8 a width in px, -1 as they are, at most 1,600 px wide.
+    resolution: 1, 2, 4, 8 divide, above 8 a width in px, -1 as they are but at most 1,600 px wide.
     eval: every 8th view is held out, or the source's own test views. images: the photo folder of
     a COLMAP project. lens: "auto", "undistort" or "original", as `darb train --lens`.
     """
@@ -294,21 +296,21 @@ class Trainer(_darb.Trainer):
     dataset: a path, or a Dataset, which brings its own resolution, eval, images and lens. Options
     have the names of `darb train --help-all` with underscores: kernel="raised_cosine",
     max_splats=100_000, effects="-exposure", random_background=False for --fixed-background.
-    start_checkpoint=path goes on from a checkpoint, of this class or of the command.
+    start_checkpoint=path goes on from a checkpoint of this class or of the command.
 
     step(n=1, loss=None) -> dict: iteration, loss, psnr (dB, of the training view), splats,
-        visible, intersections, done. With batch=B iterations count views: whole batches until n
-        of them are done, a loss of your own for each view. With loss, dL/dimage = loss(image, view) takes the place of
-        the built-in loss: image [H, W, 3] float32 as it is compared, not clamped; view a dict of
-        name, iteration, photo (uint8 [H, W, 4], of the image's size) and background [3].
+        visible, intersections, done. With batch=B, iterations count views: whole batches run until n
+        views are done, with a loss of your own for each view. With loss, dL/dimage = loss(image, view)
+        replaces the built-in loss: image is [H, W, 3] float32 as it is compared, not clamped; view is
+        a dict of name, iteration, photo (uint8 [H, W, 4], of the image's size) and background [3].
         "loss" is then still that of the built-in one.
-    evaluate() -> dict: psnr, ssim, views, over the views held out.
-    scene() -> Scene: as a file of the run holds it.
+    evaluate() -> dict: psnr, ssim, views, over the views that are held out.
+    scene() -> Scene: what a file of the run would hold.
     on_round: a function of a dict (iteration, before, after, grown, pruned), called after each
         round of density control, or None.
-    checkpoint(path): everything that is needed to go on bit by bit.
-    iteration, iterations, len(trainer): done, in all, and the splats of now.
-    options: every option by name, as it was asked for or by default.
+    checkpoint(path): saves everything that is needed to go on bit by bit.
+    iteration, iterations, len(trainer): iterations done, iterations in all, current splats.
+    options: every option by name, as it was given or by default.
 
     Ctrl-C ends step() between two iterations, and the run goes on with the next call.
     """
@@ -324,11 +326,11 @@ class Trainer(_darb.Trainer):
 # --- Kernels, plans ------------------------------------------------------------------------------
 
 def psi(kernels=None, *, samples=24, cells=64, seed=0):
-    """The correction factor psi of kernels three ways: what `darb psi --json` writes, as a dict.
+    """The correction factor psi of kernels in three ways: what `darb psi --json` writes, as a dict.
 
-    kernels: names or Kernels, or None for the family. samples: random covariances of the grid; cells: of it
-    along each axis. ["kernels"][i]["exact"] is the ratio of moments, "grid" the paper's
-    experiment, "least_squares" the best scale, "distance_from_projection" how far each is off.
+    kernels: names or Kernels, or None for the family. samples: random covariances of the grid; cells:
+    its cells along each axis. ["kernels"][i]["exact"] is the ratio of moments, "grid" the paper's
+    experiment, "least_squares" the best scale, and "distance_from_projection" how far each is off.
     """
     return _darb.psi(kernels, samples, cells, seed)
 
@@ -337,8 +339,8 @@ def sim1d(*, signals=None, kernels=None, primitives=(1, 5, 10), seeds=20, steps=
           samples=1000, lr=0.01):
     """Signals as sums of N kernels, fitted by Adam: what `darb sim1d --json` writes, as a dict.
 
-    signals: names, or None for all; kernels: these or Kernels. ["rows"] has one for each signal, kernel and number
-    of primitives, with the median loss over the seeds.
+    signals: names, or None for all; kernels: names or Kernels. ["rows"] has one row for each signal,
+    kernel and number of primitives, with the median loss over the seeds.
     """
     return _darb.sim1d({"signals": signals, "kernels": kernels, "primitives": primitives,
                         "seeds": seeds, "steps": steps, "samples": samples, "lr": lr})
@@ -346,10 +348,10 @@ def sim1d(*, signals=None, kernels=None, primitives=(1, 5, 10), seeds=20, steps=
 
 def plan(what, *, cameras=None, effects="auto", sh_degree=None, kernel=None, depth=False,
          resolution=-1, price=False, device=""):
-    """Which effects a scene or a data set calls for, and why: the rows of `darb plan --json`.
+    """Which effects a scene or a data set needs, and why: the rows of `darb plan --json`.
 
-    what: a path. cameras: of a scene, those that it will be rendered through. price: measures what
-    each effect costs on the device, ms and bytes.
+    what: a path. cameras: for a scene, those that will look at it. price: measures what each effect
+    costs on the device, ms and bytes.
     """
     return _darb.plan({"what": what, "cameras": cameras, "effects": effects,
                        "sh_degree": sh_degree, "kernel": kernel, "depth": depth,

@@ -7,7 +7,7 @@
     ((image - target) ** 2).mean().backward()
 
 Gradients reach means, quats, scales, opacities, colors or sh, shapes, background, viewmats and Ks,
-each where it asks for one.
+where these ask for them.
 """
 
 import torch as _torch
@@ -21,7 +21,7 @@ _INPUTS = ("means", "quats", "scales", "opacities", "colors", "sh", "shapes", "v
 
 
 def _array(name, value):
-    """The tensor's own memory as a numpy array; whatever else is given as it is."""
+    """The tensor's own memory as a numpy array; anything else is returned as it is."""
     if not isinstance(value, _torch.Tensor):
         return value
     if value.device.type != "cpu":
@@ -69,12 +69,12 @@ def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh
               viewmats, Ks, width, height, kernel=None, footprint=None, background=None,
               sh_degree=None, antialiased=None, near=0.2, accuracy="balanced", depth=False,
               device=""):
-    """darb.rasterize of tensors -> (image, alpha, info), image and alpha with gradients.
+    """darb.rasterize for tensors -> (image, alpha, info), image and alpha with gradients.
 
     All arguments, shapes and units are those of darb.rasterize; help(darb.rasterize) has them.
     Tensors are float32 on the CPU and contiguous; viewmats, Ks and background may be float64.
     colors=[N, 3] take any sign, as in gsplat; sh are clamped at 0 after 0.5 is added, as there.
-    Gradients are of the first order. With several cameras the backward pass draws each again.
+    Gradients are of the first order. With several cameras, the backward pass draws each picture again.
     """
     settings = dict(width=width, height=height, kernel=kernel, footprint=footprint,
                     sh_degree=sh_degree, antialiased=antialiased, near=near, accuracy=accuracy,

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Compares kernels' gradients: what each says of where a splat is and how large it is.
+"""Compares what the gradients of kernels tell about the place and the size of a splat.
 
     compare_gradients.py [-o FOLDER] [--size N]
 
@@ -39,7 +39,7 @@ def splat(x):
 
 
 def slopes(kernel, offsets, view):
-    """Loss of each offset, and dL/dx by the gradient."""
+    """The loss at each offset, and dL/dx by the gradient."""
     target = darb.rasterize(**splat(0), **view, kernel=kernel)[0]
     losses, gradients = [], []
     for x in offsets:
@@ -77,7 +77,7 @@ def main():
     view = camera(given.size)
     for kernel, (colour, _) in KERNELS.items():
         loss, gradient = slopes(kernel, offsets, view)
-        # Its integral is the loss again: a check without a step that has to be chosen.
+        # Its integral is the loss again, which is a check without a step size to choose.
         pieces = np.diff(offsets) * (gradient[1:] + gradient[:-1]) / 2
         integral = np.concatenate([[0], np.cumsum(pieces)])
         apart = np.abs(integral - (loss - loss[0])).max() / loss.max()

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Fits splats to one picture with a kernel of one's own.
+"""Fits splats to one picture with a kernel of your own.
 
     fit_picture.py [PICTURE.png] [-o FOLDER] [--splats N] [--steps N] [--kernel NAME]
 
@@ -45,7 +45,7 @@ def start(count, rng):
 
 
 def fit(target, count, steps, kernel, seed=0):
-    """-> the picture of `count` splats after `steps` of Adam on the mean square, and the losses."""
+    """-> the picture of `count` splats after `steps` of Adam on the mean square error, and the losses."""
     size = target.shape[0]
     splats = start(count, np.random.default_rng(seed))
     rates = {"means": 0.01, "quats": 0.02, "scales": 0.004, "opacities": 0.02, "colors": 0.02}

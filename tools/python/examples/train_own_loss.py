@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Trains a data set step by step with a loss of one's own.
+"""Trains a data set step by step with a loss of your own.
 
     train_own_loss.py [DATASET] [-o FOLDER] [--iterations N] [--resolution N]
 
-DATASET: the scene that lies in the source tree where it is left out; to be given elsewhere.
+DATASET: by default the scene in the source tree; elsewhere it must be given.
 
-The loss gets the picture as an array and returns its gradient: here a robust one, Charbonnier's
-sqrt(d^2 + e^2), that forgives pixels which are far off. Beside it the built-in loss is trained.
+The loss gets the picture as an array and returns its gradient. Here it is a robust one, Charbonnier's
+sqrt(d^2 + e^2), which forgives pixels that are far off. The built-in loss is trained beside it.
 """
 
 import argparse
