@@ -79,7 +79,8 @@ class PointsTarget : public Target {
   public:
     /// normals: of the points, or empty.
     PointsTarget(const std::vector<glm::dvec3>& points, const std::vector<glm::vec3>& normals)
-        : normals_(normals), view_{points},
+        : normals_(normals),
+          view_{points},
           tree_(3, view_, nanoflann::KDTreeSingleIndexAdaptorParams(10)) {
         tree_.buildIndex();
     }
@@ -97,8 +98,8 @@ class PointsTarget : public Target {
   private:
     const std::vector<glm::vec3>& normals_;
     PointsView view_;
-    nanoflann::KDTreeSingleIndexAdaptor<
-        nanoflann::L2_Simple_Adaptor<double, PointsView>, PointsView, 3>
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointsView>,
+                                        PointsView, 3>
         tree_;
 };
 
@@ -195,8 +196,7 @@ double share_within(const std::vector<Match>& matches, double threshold) {
     const auto within = std::count_if(matches.begin(), matches.end(), [&](const Match& match) {
         return match.distance <= threshold;
     });
-    return matches.empty() ? 0
-                           : static_cast<double>(within) / static_cast<double>(matches.size());
+    return matches.empty() ? 0 : static_cast<double>(within) / static_cast<double>(matches.size());
 }
 
 struct Trimmed {
@@ -439,11 +439,11 @@ PlacedShape shape_from(const nlohmann::json& object, const std::string& place) {
         const dvec3 values = vector_from(object.at("rotation").at(static_cast<std::size_t>(row)));
         for (int column = 0; column < 3; ++column) shape.rotation[column][row] = values[column];
     }
-    const glm::dmat3 error =
-        glm::transpose(shape.rotation) * shape.rotation - glm::dmat3(1.0);
+    const glm::dmat3 error = glm::transpose(shape.rotation) * shape.rotation - glm::dmat3(1.0);
     for (int k = 0; k < 9; ++k)
         if (!(std::abs(error[k / 3][k % 3]) < 1e-6))
-            throw Error(place, "its rotation is none: the rows are not at right angles, of length 1",
+            throw Error(place,
+                        "its rotation is none: the rows are not at right angles, of length 1",
                         "Give the rows of a rotation matrix.");
     return shape;
 }
@@ -482,8 +482,7 @@ std::vector<PlacedShape> read_shapes(const std::filesystem::path& path) {
     try {
         std::vector<PlacedShape> shapes;
         for (const nlohmann::json& object : file.at("shapes"))
-            shapes.push_back(
-                shape_from(object, fmt::format("{}, shape {}", where, shapes.size())));
+            shapes.push_back(shape_from(object, fmt::format("{}, shape {}", where, shapes.size())));
         if (shapes.empty()) throw Error(where, "has no shapes", kHint);
         return shapes;
     } catch (const nlohmann::json::exception& error) {

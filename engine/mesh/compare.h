@@ -46,18 +46,18 @@ struct MeshComparison {
     double bias = 0;
     double chamfer = 0;         // mean of the means of both distances, without those left out
     double left_out_share = 0;  // of all samples
-    /// Mean angle between the mesh's normal and the reference's line of normal, degrees, 0 to 90; NaN
-    /// where the reference has no normals.
+    /// Mean angle between the mesh's normal and the reference's line of normal, degrees, 0 to 90;
+    /// NaN where the reference has no normals.
     double normal_degrees = 0;
     std::vector<FScore> f_scores;  // one for each threshold
     double spacing = 0;            // as it was taken: larger where there were too many samples
 };
 
-/// reference: a mesh, or points where it has no faces. Surfaces are sampled evenly by area (seed 0),
-/// points are thinned to the spacing. Distances to a mesh are exact, to its faces; to points, those
-/// to the nearest one. Samples of both sides for which counts() is false are left out. where: names
-/// the reference in errors. Throws Error where nothing is left to compare, or the reference is too
-/// far away.
+/// reference: a mesh, or points where it has no faces. Surfaces are sampled evenly by area (seed
+/// 0), points are thinned to the spacing. Distances to a mesh are exact, to its faces; to points,
+/// those to the nearest one. Samples of both sides for which counts() is false are left out. where:
+/// names the reference in errors. Throws Error where nothing is left to compare, or the reference
+/// is too far away.
 MeshComparison compare_meshes(const TriangleMesh& mesh, const TriangleMesh& reference,
                               const CompareOptions& options, const std::string& where);
 

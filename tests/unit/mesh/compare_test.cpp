@@ -71,8 +71,9 @@ TEST(CompareMeshes, parallel_squares_are_their_distance_apart) {
 TEST(CompareMeshes, a_missing_half_lowers_recall_alone) {
     const TriangleMesh whole = square_mesh(2, 8);
     TriangleMesh half = whole;
-    std::erase_if(half.face, [&](const auto& f) { return half.position[f[0]].x >= 1 ||
-                                                         half.position[f[1]].x > 1; });
+    std::erase_if(half.face, [&](const auto& f) {
+        return half.position[f[0]].x >= 1 || half.position[f[1]].x > 1;
+    });
     CompareOptions options;
     options.spacing = 0.02;
     options.thresholds = {0.05};
@@ -87,8 +88,9 @@ TEST(CompareMeshes, a_missing_half_lowers_recall_alone) {
     options.counts = [](const glm::dvec3& p) { return p.x < 1; };
     EXPECT_NEAR(compare_meshes(half, whole, options, "reference").f_scores[0].recall, 1, 1e-12);
     options.counts = [](const glm::dvec3&) { return false; };
-    EXPECT_NE(refusal([&] { compare_meshes(half, whole, options, "r.ply"); })
-                  .find("r.ply: there is nothing to compare"),
+    EXPECT_NE(refusal([&] {
+                  compare_meshes(half, whole, options, "r.ply");
+              }).find("r.ply: there is nothing to compare"),
               std::string::npos);
 }
 
@@ -123,8 +125,9 @@ TEST(CompareMeshes, a_reference_far_off_is_asked_for_its_unit) {
     EXPECT_NE(error.find("Is it in mm"), std::string::npos) << error;
     TriangleMesh moved = mesh;
     moved.origin = {5000, 0, 0};
-    EXPECT_NE(refusal([&] { compare_meshes(mesh, moved, options, "moved.ply"); })
-                  .find("into the frame of the scene"),
+    EXPECT_NE(refusal([&] {
+                  compare_meshes(mesh, moved, options, "moved.ply");
+              }).find("into the frame of the scene"),
               std::string::npos);
     moved.origin = {1, 0, 0};
     EXPECT_EQ(refusal([&] { compare_meshes(mesh, moved, options, "near.ply"); }), "no error");
@@ -148,8 +151,8 @@ TEST(PlacedShapes, distances_are_exact) {
     const glm::dvec2 out = glm::normalize(glm::dvec2(0.8, 0.3));  // the side's normal
     EXPECT_NEAR(at(ShapeKind::cone, {0.35 + 0.1 * out.x, 0, 0.1 * out.y}), 0.1, 1e-12);
     EXPECT_NEAR(at(ShapeKind::cone, {0.35 - 0.1 * out.x, 0, -0.1 * out.y}), -0.1, 1e-12);
-    const PlacedShape turned{ShapeKind::box, {1, 2, 3}, {10, 0, 0},
-                             glm::dmat3(0, 1, 0, -1, 0, 0, 0, 0, 1)};
+    const PlacedShape turned{
+        ShapeKind::box, {1, 2, 3}, {10, 0, 0}, glm::dmat3(0, 1, 0, -1, 0, 0, 0, 0, 1)};
     EXPECT_NEAR(signed_distance(turned, {10 + 2.5, 0, 0}), 0.5, 1e-12) << "a quarter turn about z";
 }
 

@@ -57,13 +57,14 @@ int make(const Make& scene) {
 }
 
 int usage() {
-    std::fprintf(stderr,
-                 "usage: make_scene FOLDER [SCALE]   (1 to 8: photos of 200 x 150 px times this)\n"
-                 "       make_scene depths FOLDER [SCALE]   (with the true depths of the photos)\n"
-                 "       make_scene outdoors FOLDER [SCALE]   (from near the ground, under clouds)\n"
-                 "       make_scene town FOLDER SIDE SCALE   (SIDE x SIDE photos; SCALE from 0.2)\n"
-                 "       make_scene surface FOLDER   (true surfaces of the still life, no photos)\n"
-                 "       make_scene town-surface FOLDER SIDE   (those of the town)\n");
+    std::fprintf(
+        stderr,
+        "usage: make_scene FOLDER [SCALE]   (1 to 8: photos of 200 x 150 px times this)\n"
+        "       make_scene depths FOLDER [SCALE]   (with the true depths of the photos)\n"
+        "       make_scene outdoors FOLDER [SCALE]   (from near the ground, under clouds)\n"
+        "       make_scene town FOLDER SIDE SCALE   (SIDE x SIDE photos; SCALE from 0.2)\n"
+        "       make_scene surface FOLDER   (true surfaces of the still life, no photos)\n"
+        "       make_scene town-surface FOLDER SIDE   (those of the town)\n");
     return 2;
 }
 
@@ -82,7 +83,8 @@ int main(int argc, char** argv) {
     if (asks_for("town-surface", 4))
         return make([&] { write_surface(argv[2], town(), town_flight(side, 1), kTownSurface); });
     if (asks_for("surface", 3))
-        return make([&] { write_surface(argv[2], still_life(), camera_path(), kStillLifeSurface); });
+        return make(
+            [&] { write_surface(argv[2], still_life(), camera_path(), kStillLifeSurface); });
     const bool outdoors = argc >= 3 && std::strcmp(argv[1], "outdoors") == 0;
     const bool depths = argc >= 3 && std::strcmp(argv[1], "depths") == 0;
     if (outdoors || depths) {

@@ -24,8 +24,9 @@ constexpr SurfaceSettings kTownSurface{.spacing = 0.025, .floor = 15};
 /// The scene's objects and its floor.
 std::vector<PlacedShape> shapes_of(const World& world);
 
-/// Points with normals, spread by chance (seed 0) and evenly by area over the surfaces of shapes that
-/// at least two training views see. Uses all cores; the result does not depend on their number.
+/// Points with normals, spread by chance (seed 0) and evenly by area over the surfaces of shapes
+/// that at least two training views see. Uses all cores; the result does not depend on their
+/// number.
 TriangleMesh surface_points(const World& world, const std::vector<View>& views,
                             const SurfaceSettings& settings);
 
