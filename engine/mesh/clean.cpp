@@ -319,6 +319,37 @@ void remove_opposite_faces(TriangleMesh& mesh) {
     remove_faces(mesh, [&](std::size_t f) { return gone[f]; });
 }
 
+/// Collapses on flat ground may leave closed parts that enclose nothing.
+void remove_flat_parts(TriangleMesh& mesh) {
+    struct Part {
+        double volume = 0, area = 0;
+        bool closed = true;
+    };
+    const std::vector<std::uint32_t> twin = pair_half_edges(mesh).twin;
+    UnionFind joined(mesh.vertex_count());
+    for (const Corners& face : mesh.face) {
+        joined.join(face[0], face[1]);
+        joined.join(face[0], face[2]);
+    }
+    std::map<std::uint32_t, Part> parts;
+    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+        const std::uint32_t name = joined.find(mesh.face[f][0]);
+        Part& part = parts[name];
+        const glm::dvec3 cross = face_cross(mesh, f);
+        part.volume += glm::dot(cross, glm::dvec3(mesh.position[mesh.face[f][0]]) -
+                                           glm::dvec3(mesh.position[name])) /
+                       6;
+        part.area += glm::length(cross) / 2;
+        for (std::size_t c = 0; c < 3; ++c) part.closed &= twin[3 * f + c] != kNoHalfEdge;
+    }
+    constexpr double kFlat =
+        1e-3;  // of area^1.5: a ball has 0.094, a plate of 100 x 100 x 1 0.0035
+    remove_faces(mesh, [&](std::size_t f) {
+        const Part& part = parts[joined.find(mesh.face[f][0])];
+        return part.closed && std::abs(part.volume) < kFlat * std::pow(part.area, 1.5);
+    });
+}
+
 // 5. Holes.
 
 /// The triangulation of a closed run of vertices that has the least area.
@@ -487,6 +518,7 @@ Simplified simplify_mesh(const TriangleMesh& mesh, std::size_t faces) {
     kept.resize(indices / 3);
     remove_opposite_faces(result.mesh);
     split_into_manifold(result.mesh);
+    if (topology_of(result.mesh).parts > topology_of(mesh).parts) remove_flat_parts(result.mesh);
     drop_unused_vertices(result.mesh);
     if (result.mesh.face_count() == 0) return result;
     const SurfaceSearch search(result.mesh);
