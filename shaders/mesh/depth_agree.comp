@@ -21,10 +21,12 @@ layout(set = 0, binding = 2, scalar) writeonly buffer Kept { float kept[]; };  /
 #include "lib/covariance.glsl"
 #include "lib/depth_view.glsl"
 
-// Whether one of the pixels around shows the point, or the surface between them.
-bool confirms(MeshView view, vec2 pixel, float z) {
+// Whether one of the pixels around shows the point, or the surface between them. hidden: all of them show something
+// before it, so that the view says nothing of the point.
+bool confirms(MeshView view, vec2 pixel, float z, out bool hidden) {
     vec2 share;
     const vec4 d = depths_around(view, pixel, share);
+    hidden = least_of(d) > 0.0 && most_of(d) < z - AGREE_SHARE * z;
     if (one_surface(d) && z >= least_of(d) && z <= most_of(d)) return true;
     return any(lessThanEqual(abs(d - z), vec4(AGREE_SHARE * z)));
 }
@@ -44,8 +46,10 @@ void main() {
         vec2 pixel;
         float other;
         if (!place_in_view(views[v], p, pixel, other)) continue;
-        ++looks;
-        if (confirms(views[v], pixel, other)) ++agrees;
+        bool hidden;
+        const bool confirmed = confirms(views[v], pixel, other, hidden);
+        if (!hidden) ++looks;
+        if (confirmed) ++agrees;
     }
     if (looks > 0u && agrees >= min(args.least, looks)) kept[i] = z;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Truncated signed distances: each voxel of the blocks asks each view how far before (+) or behind (-) its surface it
-// is, along the view's axis and over the band, and adds that with the weight cos/z^2. Before the band it is free, +1;
+// is, along the view's axis and over the band, and adds that with the weight cos^2/z^2, as
+// depths that are read at a grazing angle are before the surface. Before the band it is free, +1;
 // behind it the view says nothing. Source: Curless and Levoy 1996.
 // Place: after the blocks around the surface are known. Work: a workgroup a block, several voxels a thread; views in
 // order, so sums have the same bits however the views are batched. Shared memory: none. Reads views and depths; reads and
@@ -40,7 +41,7 @@ void main() {
             const float surface = surface_depth(views[v], pixel, cosine);
             const float distance = (surface - z) / args.band;
             if (!(surface > 0.0) || surface > args.farthest || distance < -1.0) continue;
-            const float weight = cosine / (z * z);
+            const float weight = cosine * cosine / (z * z);
             sum += weight * vec2(min(distance, 1.0), 1.0);
         }
         sums[block * BLOCK_VOXELS + i] = sum;

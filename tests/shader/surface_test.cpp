@@ -123,8 +123,8 @@ std::vector<Camera> cameras_around(int count, double distance, int size) {
     return cameras;
 }
 
-constexpr int kViews = 20, kSize = 160;
-constexpr double kDistance = 3.4, kSpacing = 0.06, kVoxel = 0.1;
+constexpr int kViews = 24, kSize = 160;
+constexpr double kDistance = 3.4, kSpacing = 0.06, kVoxel = 0.12;
 
 std::vector<DepthView> views_of(const SplatModel& model, bool colours = false) {
     Renderer renderer(shared_device(), model);
