@@ -6,7 +6,8 @@
 //        + tangential (p1, p2) + thin prism (s1, s2),   r = |w|,
 // with w the ray itself or, for the fisheye models, the ray at distance theta; FOV has its own
 // form. EUCM has w = ray / (alpha sqrt(1 + beta r^2) + 1 - alpha), r = |ray|; DIVISION is that with
-// alpha = 1/2 and beta = -4 k. Source: COLMAP 3.8, src/base/camera_models.h; Weng et al. 1992; Devernay and Faugeras 2001.
+// alpha = 1/2 and beta = -4 k. Source: COLMAP 3.8, src/base/camera_models.h; Weng et al. 1992;
+// Devernay and Faugeras 2001.
 #pragma once
 
 #include <array>
