@@ -454,8 +454,8 @@ void set_moments(const SplatMoments& m, std::size_t i, SplatModel& model) {
     Eigen::Matrix3d matrix;
     matrix << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(matrix);
-    const Eigen::Vector3d variance = solver.eigenvalues();
-    const Eigen::Matrix3d axes = solver.eigenvectors();
+    const Eigen::Vector3d& variance = solver.eigenvalues();
+    const Eigen::Matrix3d& axes = solver.eigenvectors();
     glm::dmat3 turn;
     for (int k = 0; k < 3; ++k) turn[k] = {axes(0, k), axes(1, k), axes(2, k)};
     if (glm::determinant(turn) < 0) turn[2] = -turn[2];

@@ -299,7 +299,8 @@ class RowReader {
                    double length, bool keep) {
         if (!(length >= 0)) fail(element, row, "a list has a negative length");
         const std::size_t size = format_ == PlyFormat::ascii ? 1 : type_size(property.type);
-        if (length > static_cast<double>((file_.size() - at_) / size))
+        const std::uint64_t most = (file_.size() - at_) / size;
+        if (length > static_cast<double>(most))
             fail(element, row, "a list is longer than the file");
         list_.clear();
         if (!keep && format_ != PlyFormat::ascii) {

@@ -338,7 +338,7 @@ void effect_rows(Rows& rows) {
                     .place = [](Request& r) -> RequestPlace { return &r.refine_cameras; }});
     rows.push_back({.row = {.flags = "--blocks",
                             .group = option_group::kScene,
-                            .help = "train a scene that is too large for the memory in parts"},
+                            .help = "train a scene too large for memory in parts"},
                     .words = "auto,NxM",
                     .key = "blocks",
                     .place = [](Request& r) -> RequestPlace { return &r.blocks; }});
