@@ -73,10 +73,11 @@ make_libraries() {
     [[ ! -e $libraries/done ]] || return 0
     rm -rf "$libraries"
     mkdir -p "$libraries/source"
-    fetch fmtlib/bookworm libzip/bookworm muparser/bookworm glfw3/trixie # GLFW 3.4 looks for X11 when it is used
+    fetch fmtlib/bookworm libzip/bookworm muparser/bookworm meshoptimizer/bookworm glfw3/trixie # GLFW 3.4 looks for X11 when it is used
     library fmtlib -DFMT_TEST=OFF -DFMT_DOC=OFF
     library libzip -DENABLE_{COMMONCRYPTO,GNUTLS,MBEDTLS,OPENSSL,BZIP2,LZMA}=OFF -DBUILD_{TOOLS,REGRESS,EXAMPLES,DOC}=OFF
     library muparser -DENABLE_{SAMPLES,OPENMP,WIDE_CHAR}=OFF
+    library meshoptimizer
     library glfw3 -DGLFW_BUILD_{WAYLAND,EXAMPLES,TESTS,DOCS}=OFF
     touch "$libraries/done"
 }
@@ -88,6 +89,7 @@ make_portable() {
     make_libraries
     configure -DDARB_PORTABLE=ON -DDARB_FMT_LIBRARY="$libraries/lib/libfmt.a" \
         -DZIP_LIBRARY="$libraries/lib/libzip.a" -DMUPARSER_LIBRARY="$libraries/lib/libmuparser.a" \
+        -DMESHOPTIMIZER_LIBRARY="$libraries/lib/libmeshoptimizer.a" \
         -DDARB_GLFW_LIBRARY="$libraries/lib/libglfw3.a" -DZSTD_LIBRARY=$system/libzstd.a -DWEBP_LIBRARY=$system/libwebp.a \
         -DSTB_LIBRARY=$system/libstb.a -DZLIB_LIBRARY=$system/libz.a -DPNG_LIBRARY=$system/libpng16.a \
         -DJPEG_LIBRARY=$system/libjpeg.a
@@ -102,7 +104,7 @@ make_portable() {
     chmod u+w "$stage/$name/lib/darb/libvulkan.so.1"
     tools/portable/lower_versions.py "$stage/$name/lib/darb/libvulkan.so.1"
     documents=$stage/$name/share/doc/darb
-    for package in libfmt-dev libzip-dev libmuparser-dev libglfw3-dev libimgui-dev libstb-dev libzstd-dev libwebp-dev zlib1g-dev \
+    for package in libfmt-dev libzip-dev libmuparser-dev libmeshoptimizer-dev libglfw3-dev libimgui-dev libstb-dev libzstd-dev libwebp-dev zlib1g-dev \
         libpng-dev libjpeg62-turbo libvulkan1 gcc-12-base; do
         cp "/usr/share/doc/$package/copyright" "$documents/copyright.$package"
     done

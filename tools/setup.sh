@@ -56,8 +56,8 @@ tests    xdotool              mouse and keys in them
 tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effects that are off cost nothing
 tests    python3              style script (standard library only)
 tests    universal-ctags      sizes of functions and classes, tools/lab/structure.py
-tests    ffmpeg               the video of a camera path
 tests    assimp-utils         a second reader of the meshes that are written
+tests    ffmpeg               the video of a camera path
 tests    python3-dev          the Python module, which every build of the tests loads
 tests    pybind11-dev         the Python module
 tests    python3-numpy        its arrays
