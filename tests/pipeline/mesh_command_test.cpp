@@ -91,7 +91,7 @@ TEST(MeshCommand, Has_the_same_bits_again_and_within_less_memory) {
     ASSERT_EQ(darb(mesh_of("first.ply")).code, 0);
     ASSERT_EQ(darb(mesh_of("again.ply")).code, 0);
     const std::string report = scratch_file("ranges.json");
-    const Outcome o = darb(mesh_of("ranges.ply", "--max-memory 4MB --json " + report));
+    const Outcome o = darb(mesh_of("ranges.ply", "--max-memory 2MB --json " + report));
     ASSERT_EQ(o.code, 0) << o.err;
     EXPECT_GT(read_json(report)["ranges"], 1);
     const auto bytes = read_file(scratch_file("first.ply"));
@@ -109,8 +109,8 @@ TEST(MeshCommand, Compares_with_a_reference) {
     const nlohmann::json found = read_json(report)["comparison"];
     EXPECT_LT(found["accuracy"]["median"], 0.03);
     EXPECT_GT(found["f_scores"][0]["precision"], 0.95);
-    const Outcome own = darb(mesh_of("own.ply", fmt::format("--reference {} --json {}",
-                                                            scratch_file("compared.ply"), report)));
+    const Outcome own = darb(mesh_of(
+        "own.ply", fmt::format("--reference {} --json {}", scratch_file("compared.ply"), report)));
     ASSERT_EQ(own.code, 0) << own.err;
     EXPECT_LT(read_json(report)["comparison"]["chamfer"], 1e-5);
 }
