@@ -18,7 +18,7 @@ constexpr std::uint32_t kBlocksOfTile = 4, kBlockThreads = 64;
 
 std::uint64_t pixel_bytes(std::uint32_t segments) {
     const std::uint64_t products = segments > 1 ? MEDIAN_SAMPLES * sizeof(float) : 0;
-    return sizeof(glm::vec4) + sizeof(std::uint32_t) + products + sizeof(glm::vec2);
+    return sizeof(glm::vec4) + sizeof(glm::uvec3) + products + sizeof(glm::vec2);
 }
 
 }  // namespace
@@ -69,7 +69,7 @@ void MedianDepth::reserve(std::uint32_t splats, std::uint64_t pixels, std::uint3
     };
     hold(planes_, "splat planes", splats * sizeof(glm::vec3));
     hold(bracket_, "depth brackets", pixels * sizeof(glm::vec4));
-    hold(list_end_, "list ends", pixels * sizeof(std::uint32_t));
+    hold(part_, "parts of lists", pixels * sizeof(glm::uvec3));
     hold(product_, "light at depths", segments > 1 ? pixels * MEDIAN_SAMPLES * sizeof(float) : 4);
     hold(depth_, "median depth", pixels * sizeof(glm::vec2));
 }
@@ -102,7 +102,7 @@ void MedianDepth::record(Commands& commands, const GpuSplats& splats, const Fram
                 gpu::MedianDepthArgs{camera.width, camera.height, camera.tiles_x, level,
                                      camera.near_plane, segment, segments},
                 {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape,
-                 s.light, s.bound, s.exponent, planes_, bracket_, list_end_, product_, depth_},
+                 s.light, s.bound, s.exponent, planes_, bracket_, part_, product_, depth_},
                 camera.tiles_x, camera.tiles_y, kBlocksOfTile);
     };
     walk(bracket_pass_);

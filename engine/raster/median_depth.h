@@ -55,7 +55,7 @@ class MedianDepth {
 
     Device* device_;
     Pipeline plane_, bracket_pass_, walk_;
-    Buffer planes_, bracket_, list_end_, product_, depth_;
+    Buffer planes_, bracket_, part_, product_, depth_;
 };
 
 }  // namespace darb

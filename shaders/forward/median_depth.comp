@@ -31,7 +31,8 @@ layout(set = 0, binding = 7, scalar) readonly buffer SplatPlane { vec3 splat_pla
 // While the bracket is looked for: T (negative once the pixel has ended), the least front edge, the largest depth of
 // the splats that bring T to the level. Then: the bracket, and T at both ends; empty where its end is before its start.
 layout(set = 0, binding = 8, scalar) buffer Bracket { vec4 bracket[]; };      // [H][W]
-layout(set = 0, binding = 9, scalar) buffer ListEnd { uint list_end[]; };     // [H][W] one past the last splat drawn
+// [H][W] the part of the list, begin and end, in which splats still matter; as a float, what those before it leave.
+layout(set = 0, binding = 9, scalar) buffer Part { uvec3 part[]; };
 layout(set = 0, binding = 10, scalar) buffer Product { float product[]; };    // [MEDIAN_SAMPLES][H][W], of several segments
 layout(set = 0, binding = 11, scalar) buffer DepthOut { vec2 depth_out[]; };  // [H][W] depth, 0: no surface; opacity
 
@@ -53,7 +54,13 @@ struct Slice {
     float q, reach, mean, deviation, exponent;
 };
 
-Slice slice_of(uint splat, vec2 centre) {
+// How far before and behind its mean the slice is.
+float half_length(Slice s) {
+    return READING == DEPTH_READING_PLANE ? 0.0 : s.deviation * sqrt(max(s.reach - s.q, 0.0));
+}
+
+// Nothing of a splat that begins behind `farthest` is computed.
+Slice slice_of(uint splat, vec2 centre, float farthest) {
     Slice s;
     float l22;
     const vec4 shape = load_shape(splat, l22), bound = splat_bound[splat];
@@ -63,21 +70,17 @@ Slice slice_of(uint splat, vec2 centre) {
     s.reach = bound.y;
     s.alpha = 0.0;
     if (!(s.q <= s.reach)) return s;
+    const vec3 plane = splat_plane[splat];
+    s.mean = bound.z - plane.x * x - plane.y * y;
+    s.deviation = plane.z;
+    if (s.mean - half_length(s) > farthest) return s;
     s.exponent = 0.0;
     if (SHAPED) s.exponent = splat_exponent[splat];
     const float w = kernel_value(s.q, s.exponent), raw = min(load_light(splat).w * w, ALPHA_MAX);
     if (!(raw >= ALPHA_CUTOFF)) return s;
-    const vec3 plane = splat_plane[splat];
     s.alpha = raw;
     s.strength = raw / w;
-    s.mean = bound.z - plane.x * x - plane.y * y;
-    s.deviation = plane.z;
     return s;
-}
-
-// How far before and behind its mean the slice is.
-float half_length(Slice s) {
-    return READING == DEPTH_READING_PLANE ? 0.0 : s.deviation * sqrt(max(s.reach - s.q, 0.0));
 }
 
 // What the splat leaves of the light up to depth z.
@@ -96,15 +99,15 @@ float left_at(Slice s, float z) {
 
 void find_bracket(uvec2 range, uint first, uint bits, uint pixel, vec2 centre) {
     vec4 state = vec4(1.0, NO_EDGE, 0.0, 0.0);
-    uint end = first;
+    uint end = first;  // behind it splats begin behind the bracket, or the pixel has ended
     if (args.segment > 0u) {
         state = bracket[pixel];
-        end = list_end[pixel];
+        end = part[pixel].y;
     }
     for (uint j = range.x; j < range.y && state.x > 0.0; ++j) {
         const uint intersection = splat_from_intersection[intersection_from_sorted[j]];
         if ((intersection & bits) == 0u) continue;
-        const Slice s = slice_of(intersection & INTERSECTION_SPLAT_MASK, centre);
+        const Slice s = slice_of(intersection & INTERSECTION_SPLAT_MASK, centre, NO_EDGE);
         if (s.alpha == 0.0) continue;
         const float next = state.x - s.alpha * state.x;
         if (!(next >= MIN_TRANSMITTANCE)) {
@@ -113,9 +116,10 @@ void find_bracket(uvec2 range, uint first, uint bits, uint pixel, vec2 centre) {
         }
         const float reach = half_length(s), back = READING == DEPTH_READING_SOLID ? reach : 0.0;
         state.y = min(state.y, s.mean - reach);
-        if (state.x > args.level) state.z = max(state.z, s.mean + back);
+        const bool decides = state.x > args.level;
+        if (decides) state.z = max(state.z, s.mean + back);
+        if (decides || s.mean - reach <= state.z) end = j + 1u;
         state.x = next;
-        end = j + 1u;
     }
     if (args.segment + 1u == args.segments) {
         const float left = abs(state.x);
@@ -126,22 +130,33 @@ void find_bracket(uvec2 range, uint first, uint bits, uint pixel, vec2 centre) {
         state = left <= args.level ? vec4(low, high, 1.0, UNKNOWN) : vec4(1.0, 0.0, 1.0, 1.0);
     }
     bracket[pixel] = state;
-    list_end[pixel] = end;
+    part[pixel] = uvec3(first, end, floatBitsToUint(1.0));
 }
 
-// T at the samples, times that of earlier segments.
-void walk(uvec2 range, uint bits, vec2 centre, float low, float step, inout float left[MEDIAN_SAMPLES]) {
+// T at the samples, times what `left` has. kept: the part of the list that matters within the bracket, which ends at
+// `high`, and what the splats before that part leave.
+void walk(uvec2 range, uint bits, vec2 centre, float low, float high, inout float left[MEDIAN_SAMPLES],
+          inout uvec3 kept) {
+    const float step = (high - low) / float(MEDIAN_SAMPLES + 1u);
+    float before = uintBitsToFloat(kept.z);
+    kept.xy = range.yy;
     for (uint j = range.x; j < range.y; ++j) {
         const uint intersection = splat_from_intersection[intersection_from_sorted[j]];
         if ((intersection & bits) == 0u) continue;
-        const Slice s = slice_of(intersection & INTERSECTION_SPLAT_MASK, centre);
+        const Slice s = slice_of(intersection & INTERSECTION_SPLAT_MASK, centre, high);
         if (s.alpha == 0.0) continue;
         const float reach = half_length(s), back = READING == DEPTH_READING_SOLID ? reach : 0.0;
-        if (s.mean - reach > low + float(MEDIAN_SAMPLES) * step) continue;
         const bool passed = s.mean + back <= low;
+        if (passed && kept.x == range.y) {
+            before *= 1.0 - s.alpha;
+        } else {
+            kept.x = min(kept.x, j);
+            kept.y = j + 1u;
+        }
         for (uint i = 0u; i < MEDIAN_SAMPLES; ++i)
             left[i] *= passed ? 1.0 - s.alpha : left_at(s, low + float(i + 1u) * step);
     }
+    kept.z = floatBitsToUint(before);
 }
 
 // The part of the bracket in which T passes the level.
@@ -164,10 +179,15 @@ void search(uvec2 range, uint bits, uint pixel, vec2 centre) {
     if (b.y < b.x || is_found(b)) return;
     const float step = (b.y - b.x) / float(MEDIAN_SAMPLES + 1u);
     const uint plane = args.width * args.height;
+    uvec3 kept = part[pixel];
+    const float before = uintBitsToFloat(kept.z);
     float left[MEDIAN_SAMPLES];
-    for (uint i = 0u; i < MEDIAN_SAMPLES; ++i) left[i] = args.segment > 0u ? product[i * plane + pixel] : 1.0;
-    walk(uvec2(range.x, min(range.y, list_end[pixel])), bits, centre, b.x, step, left);
-    if (args.segment + 1u < args.segments) {
+    for (uint i = 0u; i < MEDIAN_SAMPLES; ++i) left[i] = args.segment > 0u ? product[i * plane + pixel] : before;
+    const uvec2 looked = uvec2(max(range.x, kept.x), min(range.y, kept.y));
+    if (looked.x < looked.y) walk(looked, bits, centre, b.x, b.y, left, kept);
+    if (args.segments == 1u) {
+        part[pixel] = kept;
+    } else if (args.segment + 1u < args.segments) {
         for (uint i = 0u; i < MEDIAN_SAMPLES; ++i) product[i * plane + pixel] = left[i];
         return;
     }

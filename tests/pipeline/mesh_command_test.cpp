@@ -91,7 +91,7 @@ TEST(MeshCommand, Has_the_same_bits_again_and_within_less_memory) {
     ASSERT_EQ(darb(mesh_of("first.ply")).code, 0);
     ASSERT_EQ(darb(mesh_of("again.ply")).code, 0);
     const std::string report = scratch_file("ranges.json");
-    const Outcome o = darb(mesh_of("ranges.ply", "--max-memory 4MB --json " + report));
+    const Outcome o = darb(mesh_of("ranges.ply", "--max-memory 2MB --json " + report));
     ASSERT_EQ(o.code, 0) << o.err;
     EXPECT_GT(read_json(report)["ranges"], 1);
     const auto bytes = read_file(scratch_file("first.ply"));
