@@ -100,11 +100,11 @@ TEST(MeshCommand, Has_the_same_bits_again_and_within_less_memory) {
 }
 
 TEST(MeshCommand, Compares_with_a_reference) {
-    const std::string json = scratch_file("shape.json"), report = scratch_file("compared.json");
-    write_file_atomic(json, R"({"shapes": [{"shape": "sphere", "size": [1, 0, 0],
+    const std::string truth = scratch_file("shape.json"), report = scratch_file("compared.json");
+    write_file_atomic(truth, R"({"shapes": [{"shape": "sphere", "size": [1, 0, 0],
         "position": [0, 0, 0], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]})");
     const Outcome o =
-        darb(mesh_of("compared.ply", fmt::format("--reference {} --json {}", json, report)));
+        darb(mesh_of("compared.ply", fmt::format("--reference {} --json {}", truth, report)));
     ASSERT_EQ(o.code, 0) << o.err;
     const nlohmann::json found = read_json(report)["comparison"];
     EXPECT_LT(found["accuracy"]["median"], 0.03);

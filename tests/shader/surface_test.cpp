@@ -19,11 +19,11 @@ namespace darb::test {
 namespace {
 
 enum class Solid { ball, box, ring };
-constexpr double kRadius = 1, kHalfSide = 0.7, kRingRadius = 0.8, kTubeRadius = 0.35;
+constexpr double kBallRadius = 1, kHalfSide = 0.7, kRingRadius = 0.8, kTubeRadius = 0.35;
 constexpr const char* kSolidNames[] = {"ball", "box", "ring"};
 
 double signed_distance(Solid solid, const glm::dvec3& p) {
-    if (solid == Solid::ball) return glm::length(p) - kRadius;
+    if (solid == Solid::ball) return glm::length(p) - kBallRadius;
     if (solid == Solid::ring)
         return glm::length(glm::dvec2(glm::length(glm::dvec2(p.x, p.z)) - kRingRadius, p.y)) -
                kTubeRadius;
@@ -43,7 +43,7 @@ std::vector<SurfacePoint> points_on(Solid solid, double spacing) {
         for (int i = 0; i < n; ++i) {
             const double y = 1 - (2.0 * i + 1) / n, r = std::sqrt(1 - y * y);
             const glm::dvec3 d(r * std::cos(golden * i), y, r * std::sin(golden * i));
-            points.push_back({kRadius * d, d});
+            points.push_back({kBallRadius * d, d});
         }
     } else if (solid == Solid::box) {
         // So that the splats at the edge do not stand out of the face beside theirs.
