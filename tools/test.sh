@@ -48,7 +48,7 @@ fetch_drivers() { # what drivers.gpu_compilers_slow compiles with; that test ski
     [[ -e build/gpu_compilers/bookworm-backports-radeon.json ]] ||
         timeout 120 tools/lab/gpu_compilers.py fetch build/gpu_compilers || echo "setup: no driver of AMD to compile with"
 }
-readers='core|kernels|scene|data|trainer' # libraries that read files, and those below them
+readers='core|kernels|scene|data|mesh|trainer' # libraries that read files, and those below them
 run_step() {
     case $1 in
         setup) logged tools/setup.sh && fetch_drivers ;;

@@ -125,15 +125,22 @@ TEST(CleanMesh, what_touches_in_a_vertex_or_an_edge_is_split) {
 }
 
 TEST(CleanMesh, an_edge_that_a_surface_meets_twice_is_halved) {
-    // A ring of 3 x 3: its inner tube is pinched to an edge by naming one ring's vertices twice.
-    TriangleMesh mesh = torus_mesh(1, 0.3, 6, 6);
-    for (auto& face : mesh.face)
-        for (std::uint32_t& v : face) v = v == 3 * 6 + 0 ? 0 : v == 3 * 6 + 1 ? 1 : v;
+    // A tunnel through solid whose square ring 0 is pinched to an edge: solid lies above and below
+    // it, and each of its ends is still one fan.
+    TriangleMesh mesh = torus_mesh(1, 0.3, 6, 4);
+    for (auto& face : mesh.face) {
+        std::swap(face[0], face[1]);
+        for (std::uint32_t& v : face) v = v == 3 ? 0 : v == 2 ? 1 : v;
+    }
+    std::erase_if(mesh.face, [](const auto& face) {
+        return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
+    });
     ASSERT_EQ(topology_of(mesh).crowded_edges, 1u);
-    clean_mesh(mesh, {});
-    const Topology t = topology_of(mesh);
-    EXPECT_TRUE(t.is_closed());
-    EXPECT_TRUE(t.is_manifold()) << t.crowded_edges << " " << t.pinched_vertices;
+    ASSERT_EQ(topology_of(mesh).pinched_vertices, 0u);
+    const std::size_t faces = mesh.face_count();
+    EXPECT_EQ(clean_mesh(mesh, {}).vertices_split, 1u);
+    EXPECT_EQ(mesh.face_count(), faces + 2);
+    expect_closed_manifold(mesh, 1);
 }
 
 TEST(CleanMesh, holes_below_the_length_are_filled_and_no_others) {
@@ -162,23 +169,27 @@ TEST(CleanMesh, holes_below_the_length_are_filled_and_no_others) {
 }
 
 TEST(CleanMesh, fill_has_the_least_area) {
-    // A hole over the edge of a roof: the fill along the ridge is smaller than that across it.
-    TriangleMesh mesh = box_mesh(glm::vec3(0), glm::vec3(1, 4, 1));
-    mesh.face.resize(mesh.face.size() - 2);  // the wall at x = 1
-    mesh.position[3].x = mesh.position[5].x = 1.5f;
-    const CleanReport report = clean_mesh(mesh, {.longest_rim = 100});
-    EXPECT_EQ(report.faces_filled, 2u);
-    expect_closed_manifold(mesh, 0);
-    double filled = 0;
-    for (std::size_t f = 10; f < 12; ++f) filled += glm::length(face_cross(mesh, f)) / 2;
-    const auto area = [&](int a, int b, int c) {
-        const glm::dvec3 p(mesh.position[std::size_t(a)]);
-        return glm::length(glm::cross(glm::dvec3(mesh.position[std::size_t(b)]) - p,
-                                      glm::dvec3(mesh.position[std::size_t(c)]) - p)) /
-               2;
-    };
-    EXPECT_NEAR(filled, std::min(area(1, 3, 7) + area(1, 7, 5), area(1, 3, 5) + area(3, 7, 5)),
-                1e-6);
+    // A box without a wall, one of whose corners is pulled out: which corner says which of the two
+    // diagonals is the smaller fill.
+    for (const std::size_t pulled : {1u, 3u, 5u, 7u}) {
+        TriangleMesh mesh = box_mesh(glm::vec3(0), glm::vec3(1, 4, 1));
+        mesh.face.resize(mesh.face.size() - 2);  // the wall at x = 1
+        mesh.position[pulled].x = 2;
+        const CleanReport report = clean_mesh(mesh, {.longest_rim = 100});
+        EXPECT_EQ(report.faces_filled, 2u);
+        expect_closed_manifold(mesh, 0);
+        double filled = 0;
+        for (std::size_t f = 10; f < 12; ++f) filled += glm::length(face_cross(mesh, f)) / 2;
+        const auto area = [&](std::size_t a, std::size_t b, std::size_t c) {
+            const glm::dvec3 p(mesh.position[a]);
+            return glm::length(glm::cross(glm::dvec3(mesh.position[b]) - p,
+                                          glm::dvec3(mesh.position[c]) - p)) /
+                   2;
+        };
+        const double along = area(1, 3, 7) + area(1, 7, 5), across = area(1, 3, 5) + area(3, 7, 5);
+        EXPECT_GT(std::abs(along - across), 0.01);
+        EXPECT_NEAR(filled, std::min(along, across), 1e-6) << pulled;
+    }
 }
 
 TEST(CleanMesh, a_lone_face_is_not_filled_with_its_back) {
