@@ -42,7 +42,7 @@ bool one_surface(vec4 d) {
 float surface_depth(MeshView view, vec2 pixel, out float cosine) {
     vec2 share;
     const vec4 d = depths_around(view, pixel, share);
-    cosine = 0.25;
+    cosine = 0.05;
     if (!one_surface(d)) return depth_at(view, nearest_pixel(view, pixel));
     const float z = mix(mix(d.x, d.y, share.x), mix(d.z, d.w, share.x), share.y);
     const vec2 slope = vec2(mix(d.y - d.x, d.w - d.z, share.y), mix(d.z - d.x, d.w - d.y, share.x));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Truncated signed distances: each voxel of the blocks asks each view how far before (+) or behind (-) its surface it
-// is, along the view's axis and over the band, and adds that with the weight cos^2/z^2, as
-// depths that are read at a grazing angle are before the surface. Before the band it is free, +1;
-// behind it the view says nothing. Source: Curless and Levoy 1996.
+// is, along the view's axis and over the band, and adds that with the weight cos^2/z^2, as depths that are read at a
+// grazing angle are before the surface. Before the band it is free, +1; behind it the view says nothing. Sources:
+// Curless and Levoy 1996; the falling weight is that of Voxblox (Oleynikova et al. 2017).
 // Place: after the blocks around the surface are known. Work: a workgroup a block, several voxels a thread; views in
 // order, so sums have the same bits however the views are batched. Shared memory: none. Reads views and depths; reads and
 // writes the sums.
@@ -41,7 +41,9 @@ void main() {
             const float surface = surface_depth(views[v], pixel, cosine);
             const float distance = (surface - z) / args.band;
             if (!(surface > 0.0) || surface > args.farthest || distance < -1.0) continue;
-            const float weight = cosine * cosine / (z * z);
+            // Deep behind it another side of the thing may be nearer: the weight falls from a voxel behind the surface on.
+            const float trust = clamp((1.0 + distance) / (1.0 - args.voxel / args.band), 0.0, 1.0);
+            const float weight = trust * cosine * cosine / (z * z);
             sum += weight * vec2(min(distance, 1.0), 1.0);
         }
         sums[block * BLOCK_VOXELS + i] = sum;
