@@ -10,26 +10,31 @@ namespace darb {
 
 namespace {
 
-// Rules of thumb for the growth, of runs on photos of 100 to 400 px (docs/experiments/growth.md).
-// Splats go up by the detail of the photos' opaque pixels and, as photos of one scene show the
-// same, slowly by their number. Beyond the most pixels that were tried, and where the detail is not
-// known, it goes by the root of the pixels. A dense start grows by so much at least; splats go up
-// to so many for one of the start, and not faster than so much a round.
-constexpr double kSplatsByDetail = 8'600, kDetailPower = 0.7, kPixelPower = 0.25;
-constexpr double kMostPixelsTried = 5e6;
+// Rules of thumb for the growth, of runs on photos of 87 to 1,595 px (docs/experiments/growth.md).
+// Splats go up by the detail of the photos' opaque pixels times the root of the pixels that show
+// the scene once, which hardly changes with the size of the photos: a threshold in shares of the
+// picture asks for as many. They go down with the number of photos, up to the most that were
+// tried, and with the threshold. Where the detail is not known, it goes by the root of all pixels.
+// A dense start grows by so much at least; splats go up to so many for one of the start, and not
+// faster than so much a round.
+constexpr double kSplatsByDetail = 19'000, kDetailPower = 0.774, kPhotoPower = -0.39;
+constexpr std::size_t kMostPhotosTried = 60;
+constexpr double kUsualThreshold = 2e-4, kThresholdPower = -0.72;
 constexpr double kSplatsPerRootPixel = 25;
 constexpr double kDenseGrowth = 1.3;
 constexpr double kMaxGrowth = 60;
 constexpr double kGrowthPerRound = 1.4;
 
-double splats_wanted(const GrowthStart& start) {
+double splats_wanted(const GrowthStart& start, double threshold) {
     const auto pixels = static_cast<double>(start.photo_pixels);
     const auto& [per_pixel, opaque] = start.detail;
-    if (opaque == 0) return kSplatsPerRootPixel * std::sqrt(pixels);
-    const double tried = std::min(pixels, kMostPixelsTried);
-    const double by_detail = kSplatsByDetail * std::pow(per_pixel * opaque, kDetailPower) *
-                             std::pow(tried * opaque, kPixelPower) *
-                             std::sqrt(pixels / std::max(tried, 1.0));
+    if (opaque == 0 || start.scene_pixels == 0) return kSplatsPerRootPixel * std::sqrt(pixels);
+    const double detail = per_pixel * opaque * std::sqrt(start.scene_pixels * opaque);
+    const auto photos =
+        static_cast<double>(std::clamp<std::size_t>(start.photos, 1, kMostPhotosTried));
+    const double by_detail = kSplatsByDetail * std::pow(detail, kDetailPower) *
+                             std::pow(photos, kPhotoPower) *
+                             std::pow(threshold / kUsualThreshold, kThresholdPower);
     return start.dense ? std::max(by_detail, kDenseGrowth * start.splats) : by_detail;
 }
 
@@ -51,7 +56,8 @@ std::uint32_t end_by_photos(const Schedule& schedule, const GrowthStart& start) 
     const int rounds = std::max(0, last - first);
     const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
     const double most = std::min(growth * start.splats, static_cast<double>(start.limit));
-    const auto end = static_cast<std::uint32_t>(std::min(splats_wanted(start), most));
+    const double threshold = options.densify_grad_threshold;
+    const auto end = static_cast<std::uint32_t>(std::min(splats_wanted(start, threshold), most));
     return start.random && rounds > 0 ? end : std::max(start.splats, end);
 }
 

@@ -11,6 +11,11 @@
 
 namespace darb {
 
+/// Pixels that show the scene once: of a training photo, over the share of the training photos
+/// whose frame has a point of the data set, the mean over its points. Without points every photo is
+/// taken to show all of the scene. Lenses are left aside.
+double scene_pixels(const Dataset& dataset);
+
 /// Splats at the end: by the strategy's rule of thumb.
 std::uint32_t predict_splats(const Schedule& schedule, const GrowthStart& start);
 

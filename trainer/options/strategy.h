@@ -43,6 +43,8 @@ struct GrowthStart {
     std::uint32_t limit = 0;         // what the device and options.max_splats allow
     bool random = false;             // adc's first rounds take most of these, so fewer may be left
     bool dense = false;              // points on surfaces, found by comparing photos
+    std::size_t photos = 0;          // to train on
+    double scene_pixels = 0;         // scene_pixels() of them; 0: not known
 };
 
 /// What 3DGS does where the defaults depart from it (docs/experiments/README.md says why): constant
