@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "engine/core/system.h"
 #include "engine/core/user_folders.h"
 
 namespace darb {
@@ -19,7 +20,7 @@ void separate_mesa_caches(const std::filesystem::path& root) {
         root / ("mesa-width-" + std::string(width != nullptr ? width : "default"));
     std::error_code error;
     std::filesystem::create_directories(folder, error);
-    if (!error) ::setenv("MESA_SHADER_CACHE_DIR", folder.c_str(), 0);
+    if (!error) set_missing_environment("MESA_SHADER_CACHE_DIR", folder.string());
 }
 
 }  // namespace

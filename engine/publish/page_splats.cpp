@@ -28,8 +28,9 @@ using Values = std::function<double(std::size_t)>;
 
 std::size_t deflated_size(const std::vector<std::byte>& bytes) {
     std::vector<Bytef> out(compressBound(bytes.size()));
-    uLongf size = out.size();
-    compress2(out.data(), &size, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), 1);
+    auto size = static_cast<uLongf>(out.size());
+    compress2(out.data(), &size, reinterpret_cast<const Bytef*>(bytes.data()),
+              static_cast<uLong>(bytes.size()), 1);
     return size;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // darb cost SCENE.ply [DATASET]: what each accuracy setting costs in time and buys in accuracy.
 #include <fmt/format.h>
-#include <unistd.h>
 #include <filesystem>
 #include <memory>
 #include <string>

@@ -2,9 +2,9 @@
 #include "trainer/run/progress.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "engine/core/say.h"
+#include "engine/core/system.h"
 
 namespace darb {
 
@@ -30,7 +30,7 @@ Progress::Progress(int first_iteration, int last_iteration, bool quiet)
     : first_(first_iteration),
       last_(last_iteration),
       quiet_(quiet),
-      terminal_(::isatty(STDERR_FILENO) == 1),
+      terminal_(is_terminal(stderr)),
       start_(Clock::now()),
       last_print_(start_),
       begin_(start_) {}
