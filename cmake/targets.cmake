@@ -13,6 +13,12 @@ endfunction()
 # becomes a library, too, so that the arrows in CMakeLists.txt hold.
 function(darb_library name)
   file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/engine/${name}/*.cpp)
+  # What needs the system is written once for each (engine/core).
+  if(WIN32)
+    list(FILTER sources EXCLUDE REGEX "_posix\\.cpp$")
+  else()
+    list(FILTER sources EXCLUDE REGEX "_windows\\.cpp$")
+  endif()
   if(NOT sources)
     set(sources ${PROJECT_BINARY_DIR}/generated/headers_only.cpp)
     file(CONFIGURE OUTPUT ${sources} CONTENT "")

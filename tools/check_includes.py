@@ -6,9 +6,9 @@
 
 The arrows are the lines "PART -> PART PART ..." of the block fenced as ```arrows. A part is a
 folder; a file belongs to the longest part that holds it, and may always include its own part. The
-words in angle brackets are outside libraries that only the parts naming them may include. A target
-may also be a folder of parts, which stands for all of them. An arrow that no include uses is a
-violation, too.
+words in angle brackets are outside libraries that only the parts naming them may include: <posix>
+and <windows> are the headers of those systems, which are neither C++ nor C. A target may also be a
+folder of parts, which stands for all of them. An arrow that no include uses is a violation, too.
 """
 
 import os
@@ -16,6 +16,12 @@ import re
 import sys
 
 SUFFIXES = (".h", ".cpp", ".comp", ".glsl")
+SYSTEMS = {
+    "<posix>": ("sys", "arpa", "mach-o", "net", "netinet", "dlfcn.h", "execinfo.h", "fcntl.h", "ifaddrs.h", "malloc.h", "netdb.h",
+                "poll.h", "pthread.h", "pwd.h", "sched.h", "semaphore.h", "signal.h", "spawn.h", "strings.h",
+                "termios.h", "ucontext.h", "unistd.h"),
+    "<windows>": ("direct.h", "io.h", "process.h", "psapi.h", "shellapi.h", "shlobj.h", "windows.h", "winsock2.h"),
+}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 
 
@@ -30,7 +36,7 @@ def read_arrows(path):
         if line.strip():
             part, _, targets = line.partition("->")
             arrows[part.strip()] = set(targets.split())
-    libraries = {t for targets in arrows.values() for t in targets if t.startswith("<")}
+    libraries = set(SYSTEMS) | {t for targets in arrows.values() for t in targets if t.startswith("<")}
     for part, targets in arrows.items():
         for target in targets - libraries - arrows.keys():
             if not any(other.startswith(target + "/") for other in arrows):
@@ -47,6 +53,12 @@ def part_of(path, arrows):
 def named(part, targets):
     """The targets that name the part, either itself or as one part of a folder."""
     return {target for target in targets if part == target or (part or "").startswith(target + "/")}
+
+
+def library_of(included):
+    """The word in angle brackets that stands for an include of an outside library."""
+    first = included.split("/")[0]
+    return next((system for system, heads in SYSTEMS.items() if first in heads), f"<{first}>")
 
 
 def source_files(root, arrows):
@@ -78,7 +90,7 @@ def violations(root, file, arrows, libraries, used):
         line = text.count("\n", 0, match.start(2)) + 1
         bracket, included = match.groups()
         if bracket == "<":
-            library = f"<{included.split('/')[0]}>"
+            library = library_of(included)
             used.add((part, library))
             if library in libraries and library not in arrows[part]:
                 yield line, f"{part} may not include <{included}>"

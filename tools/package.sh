@@ -44,17 +44,8 @@ make_deb() {
 libraries=$PWD/$build/libraries # the prefix of what is built here
 system=/usr/lib/x86_64-linux-gnu
 
-# fetch PACKAGE/SUITE...: fetches Debian's source packages, whatever sources this machine's own apt knows.
-fetch() {
-    local apt=$libraries/apt mirror
-    mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2>/dev/null | grep -m 1 '/debian/*$' || true)
-    [[ -n $mirror ]] || { echo "package.sh: this machine's apt has no source of Debian" >&2; exit 2; }
-    mkdir -p "$apt/lists/partial"
-    printf "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] $mirror %s main\n" bookworm trixie >"$apt/sources.list"
-    local options=(-q -o "Dir::Etc::sourcelist=$apt/sources.list" -o Dir::Etc::sourceparts=- -o "Dir::State::lists=$apt/lists" -o APT::Get::List-Cleanup=0)
-    apt-get "${options[@]}" update >/dev/null
-    (cd "$libraries/source" && apt-get "${options[@]}" source "$@") >"$libraries/source.log" 2>&1 || { tail "$libraries/source.log" >&2; exit 1; }
-}
+# shellcheck source=tools/portable/debian_sources.sh
+. tools/portable/debian_sources.sh
 
 # library NAME OPTIONS...: builds a source package's static library, without what darb does not use.
 library() {
@@ -72,8 +63,7 @@ library() {
 make_libraries() {
     [[ ! -e $libraries/done ]] || return 0
     rm -rf "$libraries"
-    mkdir -p "$libraries/source"
-    fetch fmtlib/bookworm libzip/bookworm muparser/bookworm meshoptimizer/bookworm glfw3/trixie # GLFW 3.4 looks for X11 when it is used
+    debian_sources "$libraries" fmtlib/bookworm libzip/bookworm muparser/bookworm meshoptimizer/bookworm glfw3/trixie # GLFW 3.4 looks for X11 when it is used
     library fmtlib -DFMT_TEST=OFF -DFMT_DOC=OFF
     library libzip -DENABLE_{COMMONCRYPTO,GNUTLS,MBEDTLS,OPENSSL,BZIP2,LZMA}=OFF -DBUILD_{TOOLS,REGRESS,EXAMPLES,DOC}=OFF
     library muparser -DENABLE_{SAMPLES,OPENMP,WIDE_CHAR}=OFF

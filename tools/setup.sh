@@ -14,6 +14,7 @@ usage: tools/setup.sh [options]
   --with-packaging      what tools/package.sh and tools/package_test.sh run
   --with-colmap         COLMAP too: training from photos without cameras runs it
   --with-mpi            Open MPI: training on several machines, docs/scale.md
+  --with-windows        Debian 12: what tools/windows.sh builds darb for Windows with, and tries it with
   --with-mesa-backport  Debian 12: Mesa 25 from bookworm-backports; on the CPU it blends 1.5-1.7
                         times as fast as Mesa 22.3
 TEXT
@@ -79,6 +80,14 @@ packaging debootstrap        tools/package_test.sh: bare systems
 colmap   colmap               cameras from photos; optional
 mpi      libopenmpi-dev       several machines; optional
 mpi      openmpi-bin          mpirun; optional
+windows  g++-mingw-w64-x86-64-posix  compiler for Windows; optional
+windows  libz-mingw-w64-dev   zlib for Windows; optional
+windows  nasm                 tools/windows.sh: decoding of JPEG
+windows  dpkg-dev             tools/windows.sh: sources of Debian
+windows  nsis                 tools/windows.sh: the installer
+windows  wine                 tools/windows.sh: runs what was built
+windows  wine64               tools/windows.sh: its programs
+windows  xvfb                 tools/windows.sh: a display for Wine
 '
 
 dry_run=0 backport=0 groups="build run tests"
@@ -91,6 +100,7 @@ for option in "$@"; do
         --with-packaging) groups+=" packaging" ;;
         --with-colmap) groups+=" colmap" ;;
         --with-mpi) groups+=" mpi" ;;
+        --with-windows) groups+=" windows" ;;
         --with-mesa-backport) backport=1 ;;
         -h | --help) usage; exit 0 ;;
         *) echo "setup.sh: unknown option $option" >&2; usage >&2; exit 2 ;;

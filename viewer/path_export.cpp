@@ -1,22 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include "viewer/path_export.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <csignal>
-#include <cstring>
 #include <sstream>
 #include <vector>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/process.h"
+#include "engine/core/system_files.h"
 #include "engine/data/image_io.h"
 #include "engine/data/panorama_files.h"
 #include "engine/data/video.h"
@@ -111,14 +106,10 @@ fs::path ExportFolder::claim(const std::string& name) {
     const fs::path list = folder_ / kList;
     if (listed_.contains(name)) return folder_ / name;
     // Each frame appends a line, so that the list is complete even when the export is killed.
-    const int file = ::open(list.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | O_NOFOLLOW);
+    File file(list, File::Open::append_own);
     const std::string line = name + '\n';
-    const bool written =
-        file >= 0 && ::write(file, line.data(), line.size()) == static_cast<ssize_t>(line.size());
-    const std::string reason = std::strerror(errno);
-    if (file >= 0) ::close(file);
-    if (!written)
-        throw Error(list.string(), "cannot be written: " + reason,
+    if (!file.is_open() || !file.write(std::as_bytes(std::span(line))))
+        throw Error(list.string(), "cannot be written: " + file.error().message(),
                     "Free space or choose another folder.");
     listed_.insert(name);
     return folder_ / name;
@@ -130,13 +121,15 @@ void ExportFolder::keep_video() {
 }
 
 void ExportFolder::drop_unfinished_video() const {
-    if (is_ours(kUnfinishedVideo)) ::unlink((folder_ / kUnfinishedVideo).c_str());
+    std::error_code none;
+    if (is_ours(kUnfinishedVideo)) fs::remove(folder_ / kUnfinishedVideo, none);
 }
 
 void ExportFolder::finish(std::int64_t frames) {
     check_list();
+    std::error_code none;
     for (const std::string& name : listed_)
-        if (frame_number(name) >= frames && is_ours(name)) ::unlink((folder_ / name).c_str());
+        if (frame_number(name) >= frames && is_ours(name)) fs::remove(folder_ / name, none);
     std::erase_if(listed_, [&](const std::string& name) { return is_missing(folder_ / name); });
     write_list();
 }
@@ -182,10 +175,8 @@ PathExport::PathExport(CameraPath path, const ExportOptions& options)
 }
 
 PathExport::~PathExport() {
-    if (ffmpeg_ <= 0) return;
-    ::kill(ffmpeg_, SIGTERM);
-    int status = 0;
-    wait_for_ffmpeg(status, true);
+    if (!ffmpeg_) return;
+    ffmpeg_.reset();
     folder_.drop_unfinished_video();
 }
 
@@ -198,7 +189,7 @@ void PathExport::step(const Render& render, bool wait) {
         write(folder_.claim(frame_name(next_)),
               render(view.camera(options_.width, options_.height), options_.display));
         ++next_;
-    } else if (ffmpeg_ < 0) {
+    } else if (!ffmpeg_) {
         folder_.finish(frames_);
         start_video();
     } else {
@@ -234,32 +225,21 @@ void PathExport::start_video() {
                                    "-f",
                                    "mp4",
                                    fs::absolute(unfinished).string()};
-    std::vector<char*> argv;
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    if (posix_spawnp(&ffmpeg_, "ffmpeg", nullptr, nullptr, argv.data(), environ) != 0) {
-        ffmpeg_ = -1;
+    if (is_installed("ffmpeg")) {
+        ffmpeg_ = std::make_unique<ChildProcess>(words);
+    } else {
         done_ = true;
         folder_.finish(frames_);
         summary_ += "; no video, ffmpeg is not installed";
     }
 }
 
-// Returns whether it has ended.
-bool PathExport::wait_for_ffmpeg(int& status, bool wait) const {
-    pid_t ended = -1;
-    do ended = waitpid(ffmpeg_, &status, wait ? 0 : WNOHANG);
-    while (ended < 0 && errno == EINTR);
-    if (ended < 0) status = -1;
-    return ended != 0;
-}
-
 void PathExport::watch_video(bool wait) {
-    int status = 0;
-    if (!wait_for_ffmpeg(status, wait)) return;
-    ffmpeg_ = -1;
+    const std::optional<ProcessEnd> ended = wait ? ffmpeg_->wait() : ffmpeg_->look();
+    if (!ended) return;
+    ffmpeg_.reset();
     done_ = true;
-    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+    if (ended->is_good()) {
         if (options_.panorama) mark_panorama_video(folder_.path() / ExportFolder::kUnfinishedVideo);
         folder_.keep_video();
         summary_ += "; video " + (folder_.path() / ExportFolder::kVideo).string();

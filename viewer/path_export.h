@@ -3,14 +3,15 @@
 // alive, and then as a video where ffmpeg is installed.
 #pragma once
 
-#include <sys/types.h>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <set>
 #include <string>
 
 #include "engine/core/image.h"
+#include "engine/core/process.h"
 #include "viewer/camera_path.h"
 #include "viewer/display.h"
 
@@ -90,12 +91,11 @@ class PathExport {
   private:
     void start_video();
     void watch_video(bool wait);
-    bool wait_for_ffmpeg(int& status, bool wait) const;
     CameraPath path_;
     ExportOptions options_;
     std::int64_t frames_, next_ = 0;
     ExportFolder folder_;
-    pid_t ffmpeg_ = -1;
+    std::unique_ptr<ChildProcess> ffmpeg_;  // while it runs
     bool done_ = false;
     std::string summary_;
 };

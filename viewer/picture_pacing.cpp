@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "viewer/picture_pacing.h"
 
-#include <dlfcn.h>
-#include <sys/resource.h>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -12,6 +10,7 @@
 #include <numbers>
 #include <utility>
 
+#include "engine/core/system.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/merge_splats.h"
 
@@ -221,7 +220,7 @@ void MotionLevels::run() {
 }
 
 void MotionLevels::make_levels(bool quick) {
-    setpriority(PRIO_PROCESS, 0, quick ? kQuickNice : kNice);  // applies to this thread, on Linux
+    lower_thread_priority(quick ? kQuickNice : kNice);
     const MergeOptions options{.threads = 1, .quick = quick, .progress = [this](double) {
                                    if (cancelled_) throw LevelsCancelled();
                                }};
@@ -294,14 +293,15 @@ bool survive_display_loss(std::atomic<bool>& lost) {
     using GetDisplay = void* (*)();
     using OnExit = void (*)(void* display, void* user);
     using SetOnExit = void (*)(void* display, OnExit on_exit, void* user);
-    void* const x11 = ::dlopen("libX11.so.6", RTLD_LAZY | RTLD_NOLOAD);  // stays open until the end
+    constexpr const char* kX11 = "libX11.so.6";
     const auto get_display =
-        reinterpret_cast<GetDisplay>(::dlsym(RTLD_DEFAULT, "glfwGetX11Display"));
-    if (x11 == nullptr || get_display == nullptr) return false;
-    const auto set = reinterpret_cast<SetOnExit>(::dlsym(x11, "XSetIOErrorExitHandler"));
+        reinterpret_cast<GetDisplay>(loaded_function(nullptr, "glfwGetX11Display"));
+    if (get_display == nullptr) return false;
+    const auto set = reinterpret_cast<SetOnExit>(loaded_function(kX11, "XSetIOErrorExitHandler"));
     using OnError = int (*)(void* display);
     using SetOnError = OnError (*)(OnError on_error);
-    const auto set_on_error = reinterpret_cast<SetOnError>(::dlsym(x11, "XSetIOErrorHandler"));
+    const auto set_on_error =
+        reinterpret_cast<SetOnError>(loaded_function(kX11, "XSetIOErrorHandler"));
     void* const display = set != nullptr && set_on_error != nullptr ? get_display() : nullptr;
     if (display == nullptr) return false;
     // The first handler ends the process unless it is replaced; the second one does so if the first

@@ -33,6 +33,10 @@ void check_is_file(const std::filesystem::path& path);
 void write_file_atomic(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file_atomic(const std::filesystem::path& path, std::string_view text);
 
+/// Throws Error where the system keeps a part of the name for a device, as Windows does con and
+/// aux. write_file_atomic calls it; this is for folders.
+void check_file_name(const std::filesystem::path& path);
+
 using FileParts = std::span<const std::span<const std::byte>>;
 
 /// Writes the parts one after the other, without first copying them into one buffer. Otherwise as

@@ -43,11 +43,6 @@ template <typename... T>
 void tell(std::FILE* stream, fmt::format_string<T...> format, T&&... values);
 void tell_text(std::string_view text);  // unchanged
 
-/// Opens /dev/null in place of stdin, stdout or stderr where one is closed. Otherwise the next file
-/// to be opened would take its number and receive what is printed. Writing to a stdout opened in
-/// this way fails.
-void keep_standard_descriptors();
-
 template <typename... T>
 void say(fmt::format_string<T...> format, T&&... values) {
     say_text(printable(fmt::format(format, std::forward<T>(values)...), true));

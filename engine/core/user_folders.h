@@ -7,9 +7,11 @@
 
 namespace darb {
 
-/// $XDG_CACHE_HOME/darb, else $HOME/.cache/darb; "" where neither is set.
+/// $XDG_CACHE_HOME/darb, else $HOME/.cache/darb, and on Windows %LOCALAPPDATA%\darb\cache; "" where
+/// none is set.
 std::filesystem::path cache_folder();
-/// $XDG_STATE_HOME/darb, else $HOME/.local/state/darb; "" where neither is set.
+/// $XDG_STATE_HOME/darb, else $HOME/.local/state/darb, and on Windows %LOCALAPPDATA%\darb\state; ""
+/// where none is set.
 std::filesystem::path state_folder();
 
 }  // namespace darb

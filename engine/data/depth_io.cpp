@@ -338,9 +338,10 @@ std::vector<std::byte> tiff_samples(const TiffFile& tiff, const TiffLayout& in,
                    packed.begin() + static_cast<std::ptrdiff_t>(std::min(size, packed.size())));
     } else if (in.compression == 8 || in.compression == 32946) {
         raw.resize(size);
-        uLongf made = size;
+        auto made = static_cast<uLongf>(size);
         uncompress(reinterpret_cast<Bytef*>(raw.data()), &made,
-                   reinterpret_cast<const Bytef*>(packed.data()), packed.size());
+                   reinterpret_cast<const Bytef*>(packed.data()),
+                   static_cast<uLong>(packed.size()));
         raw.resize(std::min<std::size_t>(made, size));
     } else if (in.compression == 5) {
         raw = unlzw(packed, size);

@@ -88,12 +88,13 @@ void note_unread_depths(const fs::path& depths, Dataset& dataset) {
     std::set<std::string> wanted;
     for (const View& view : dataset.views)
         if (view.depth.empty())
-            for (const fs::path& stem : depth_stems(view.name)) wanted.insert(stem.string());
+            for (const fs::path& stem : depth_stems(view.name))
+                wanted.insert(stem.generic_string());
     std::size_t count = 0;
     fs::path first;
     for (const auto& entry : fs::recursive_directory_iterator(depths)) {
         fs::path stem = entry.path().lexically_relative(depths);
-        if (!entry.is_regular_file() || !wanted.contains(stem.replace_extension().string()))
+        if (!entry.is_regular_file() || !wanted.contains(stem.replace_extension().generic_string()))
             continue;
         if (count++ == 0 || entry.path() < first) first = entry.path();
     }
@@ -116,7 +117,7 @@ void check_depths(const fs::path& depths, const fs::path& images, const Dataset&
         if (!is_depth_name(file)) continue;
         fs::path stem = fs::relative(file, depths).replace_extension();
         for (const std::string_view word : {"_depth", ".depth"})
-            if (const std::string name = stem.string();
+            if (const std::string name = stem.generic_string();
                 name.ends_with(word) && !known.contains(stem))
                 stem = name.substr(0, name.size() - word.size());
         if (known.contains(stem) || !find_photo(images, stem.string()).empty()) continue;

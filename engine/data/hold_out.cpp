@@ -2,7 +2,6 @@
 #include "engine/data/hold_out.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <charconv>
@@ -15,6 +14,7 @@
 #include <utility>
 
 #include "engine/core/error.h"
+#include "engine/core/system_files.h"
 #include "engine/data/dataset.h"
 
 namespace darb {
@@ -215,14 +215,14 @@ std::vector<std::size_t> first_of_photo(const std::vector<View>& views) {
     constexpr std::uint64_t kHead = 1 << 16;  // this many bytes tell nearly all files apart
     std::vector<std::size_t> first(views.size());
     std::iota(first.begin(), first.end(), std::size_t{0});
-    std::map<std::pair<dev_t, ino_t>, std::size_t> files;
+    std::map<FileId, std::size_t> files;
     std::map<std::uint64_t, std::vector<std::size_t>> by_size;
     for (std::size_t i = 0; i < views.size(); ++i) {
-        struct stat info {};
-        if (::stat(views[i].photo.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) continue;
-        const auto [known, is_new] = files.try_emplace({info.st_dev, info.st_ino}, i);
+        const FileFacts facts = file_facts(views[i].photo);
+        if (facts.kind != FileKind::regular) continue;
+        const auto [known, is_new] = files.try_emplace(facts.id, i);
         if (is_new)
-            by_size[std::uint64_t(info.st_size)].push_back(i);
+            by_size[facts.bytes].push_back(i);
         else
             first[i] = known->second;
     }

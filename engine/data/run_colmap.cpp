@@ -1,20 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "engine/data/run_colmap.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
+#include <array>
 #include <charconv>
 #include <chrono>
 #include <cmath>
-#include <csignal>
-#include <cstdlib>
 #include <deque>
 #include <fstream>
 #include <map>
@@ -24,6 +17,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/process.h"
 #include "engine/data/colmap.h"
 
 namespace darb {
@@ -217,99 +211,30 @@ std::string shell_text(const ColmapCommand& command) {
     return text;
 }
 
-/// A running program whose output goes to a pipe. It is ended when this process ends, however that
-/// happens, or when this object is destroyed.
-class ColmapProcess {
-  public:
-    explicit ColmapProcess(const ColmapCommand& command);
-    ~ColmapProcess() {
-        if (pid_ > 0) end();
-        if (output_ >= 0) ::close(output_);
-    }
-    ColmapProcess(const ColmapProcess&) = delete;
-    ColmapProcess& operator=(const ColmapProcess&) = delete;
-    int output() const { return output_; }
-    /// Waits for it and returns its exit status, as waitpid() reports it.
-    int wait() {
-        int status = -1;
-        while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
-        }
-        pid_ = -1;
-        return status;
-    }
-
-  private:
-    void end();
-    pid_t pid_ = -1;
-    int output_ = -1;
-};
-
-ColmapProcess::ColmapProcess(const ColmapCommand& command) {
-    std::vector<std::string> words = command, settings;
-    for (char** at = environ; *at != nullptr; ++at)
-        if (!std::string_view(*at).starts_with("QT_QPA_PLATFORM=")) settings.emplace_back(*at);
-    settings.emplace_back("QT_QPA_PLATFORM=offscreen");
-    std::vector<char*> argv, envp;
-    for (std::string& word : words) argv.push_back(word.data());
-    for (std::string& setting : settings) envp.push_back(setting.data());
-    argv.push_back(nullptr);
-    envp.push_back(nullptr);
-    int ends[2];
-    if (::pipe2(ends, O_CLOEXEC) != 0)
-        throw Error("colmap", "cannot be started", "Free memory or processes.");
-    const pid_t parent = ::getpid();
-    pid_ = ::fork();
-    if (pid_ == 0) {  // only calls that a signal handler may make: there may be other threads
-        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-        if (::getppid() != parent) ::_exit(127);
-        const int nothing = ::open("/dev/null", O_RDONLY);
-        ::dup2(nothing, STDIN_FILENO);
-        ::dup2(ends[1], STDOUT_FILENO);
-        ::dup2(ends[1], STDERR_FILENO);
-        ::execvpe(argv[0], argv.data(), envp.data());
-        ::_exit(127);
-    }
-    ::close(ends[1]);
-    output_ = ends[0];
-    if (pid_ < 0) throw Error("colmap", "cannot be started", "Free memory or processes.");
-}
-
-void ColmapProcess::end() {
-    constexpr int kPatience = 20, kPause_ms = 100;  // it has 2 s to end by itself
-    ::kill(pid_, SIGTERM);
-    for (int i = 0; i < kPatience; ++i) {
-        if (::waitpid(pid_, nullptr, WNOHANG) != 0) {
-            pid_ = -1;
-            return;
-        }
-        std::this_thread::sleep_for(std::chrono::milliseconds(kPause_ms));
-    }
-    ::kill(pid_, SIGKILL);
-    wait();
-}
-
 bool is_stopped(const std::atomic<bool>* stop) {
     return stop != nullptr && stop->load();
 }
 
 /// Passes on each line and, with whole = false, the beginning of a line that has not ended; calls
-/// on_tick twice a second. Returns the exit status. Throws ColmapStopped.
-int run_process(const ColmapCommand& command, const std::atomic<bool>* stop,
-                const std::function<void(std::string_view line, bool whole)>& on_line,
-                const std::function<void()>& on_tick) {
-    ColmapProcess process(command);
+/// on_tick twice a second. Throws ColmapStopped.
+ProcessEnd run_to_end(const ColmapCommand& command, const std::atomic<bool>* stop,
+                      const std::function<void(std::string_view line, bool whole)>& on_line,
+                      const std::function<void()>& on_tick) {
+    using enum ProcessOptions::Output;
+    ChildProcess process(command, {.variables = {{"QT_QPA_PLATFORM", "offscreen"}},
+                                   .output = piped,
+                                   .errors = piped,
+                                   .no_input = true,
+                                   .ends_with_this = true});
     std::string rest;
-    char part[4096];
+    std::array<char, 4096> part;
     for (;;) {
         if (is_stopped(stop)) throw ColmapStopped{};
-        pollfd ready{process.output(), POLLIN, 0};
-        const int count = ::poll(&ready, 1, kTick_ms);
+        const std::optional<std::size_t> bytes = process.read(part, kTick_ms);
         if (on_tick) on_tick();
-        if (count == 0 || (count < 0 && errno == EINTR)) continue;
-        const ssize_t bytes = ::read(process.output(), part, sizeof part);
-        if (bytes < 0 && errno == EINTR) continue;
-        if (bytes <= 0) break;
-        rest.append(part, static_cast<std::size_t>(bytes));
+        if (!bytes) continue;
+        if (*bytes == 0) break;
+        rest.append(part.data(), *bytes);
         std::size_t begin = 0;
         for (std::size_t end; (end = rest.find_first_of("\r\n", begin)) != std::string::npos;
              begin = end + 1)
@@ -318,22 +243,22 @@ int run_process(const ColmapCommand& command, const std::atomic<bool>* stop,
         if (!rest.empty()) on_line(rest, false);
     }
     if (!rest.empty()) on_line(rest, true);
-    const int status = process.wait();
+    const ProcessEnd ended = process.wait();
     // A Ctrl-C in the terminal reaches COLMAP as well, and maybe earlier than this process.
-    for (int i = 0; i < 5 && WIFSIGNALED(status) && stop != nullptr && !is_stopped(stop); ++i)
+    for (int i = 0; i < 5 && ended.was_killed && stop != nullptr && !is_stopped(stop); ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     if (is_stopped(stop)) throw ColmapStopped{};
-    return status;
+    return ended;
 }
 
 /// What a command prints, whatever its exit status: some versions report their help as a failure.
 std::string colmap_output_of(const ColmapCommand& command, const std::atomic<bool>* stop) {
     std::string text;
-    run_process(command, stop,
-                [&](std::string_view line, bool whole) {
-                    if (whole) text += std::string(line) + "\n";
-                },
-                {});
+    run_to_end(command, stop,
+               [&](std::string_view line, bool whole) {
+                   if (whole) text += std::string(line) + "\n";
+               },
+               {});
     return text;
 }
 
@@ -475,12 +400,6 @@ std::string shell_quoted(const fs::path& path) {
     return text + "'";
 }
 
-bool is_installed(const std::string& program) {
-    return std::system(
-               ("command -v " + shell_quoted(fs::path(program)) + " > /dev/null 2>&1").c_str()) ==
-           0;
-}
-
 bool ColmapHelp::has_new_names() const {
     return lists(extractor, "FeatureExtraction.use_gpu");
 }
@@ -615,7 +534,7 @@ void ColmapRunner::step(ColmapStep step, const ColmapCommand& command, bool may_
     const auto on_tick = [&] {
         if (Clock::now() - told >= std::chrono::seconds(1)) tell();
     };
-    const int status = run_process(command, run_.stop, on_line, on_tick);
+    const ProcessEnd ended = run_to_end(command, run_.stop, on_line, on_tick);
     if (step == ColmapStep::extract) {
         if (photos_ == 0) photos_ = output.total();
         std::vector<std::size_t> counts = output.features();
@@ -623,10 +542,10 @@ void ColmapRunner::step(ColmapStep step, const ColmapCommand& command, bool may_
         std::nth_element(counts.begin(), middle, counts.end());
         if (!counts.empty()) features_ = *middle;
     }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+    if (ended.is_good()) return;
     const std::string failure =
         fmt::format("failed:\n    {}\n  It printed last:{}", shell_text(command), joined(last));
-    if (!may_fail || !WIFEXITED(status))
+    if (!may_fail || ended.was_killed)
         throw Error("colmap", failure, step == ColmapStep::map ? kMotionHint : kPhotosHint);
     failure_ = failure;
 }
@@ -644,7 +563,7 @@ ColmapRunner::Attempt ColmapRunner::attempt(std::size_t number, ColmapEffort eff
     for (const ColmapStep i : {ColmapStep::extract, ColmapStep::match, ColmapStep::map})
         for (std::size_t w = 1; w < commands[std::size_t(i)].size(); ++w) {
             const std::string& word = commands[std::size_t(i)][w];
-            if (word.find('/') == std::string::npos) options += word + "\n";
+            if (word.find_first_of("/\\") == std::string::npos) options += word + "\n";
         }
     const fs::path options_file = folder / kOptionsFile;
     if (!fs::exists(options_file) || read_text_file(options_file) != options) {

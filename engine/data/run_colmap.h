@@ -127,7 +127,4 @@ std::string largest_colmap_model(const std::filesystem::path& sparse);
 /// The path in single quotes, for a shell.
 std::string shell_quoted(const std::filesystem::path& path);
 
-/// Whether the shell finds a program with this name.
-bool is_installed(const std::string& program);
-
 }  // namespace darb

@@ -3,18 +3,16 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <iterator>
-#include <memory>
+#include <span>
 #include <string>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/process.h"
+#include "engine/core/system_files.h"
 #include "engine/core/text.h"
 #include "engine/data/run_colmap.h"
 
@@ -43,32 +41,25 @@ void need_ffmpeg(const fs::path& video) {
 // A temporary file for ffmpeg's complaints, deleted with this object.
 class LogFile {
   public:
-    LogFile() {
-        std::string name = (fs::temp_directory_path() / "darb_ffmpeg_XXXXXX").string();
-        const int file = ::mkstemp(name.data());  // mkstemp makes a file that did not exist
-        if (file < 0)
-            throw Error(name, "cannot be made", "Free space in the folder of temporary files.");
-        ::close(file);
-        path_ = name;
-    }
+    LogFile() = default;
     LogFile(const LogFile&) = delete;
     LogFile& operator=(const LogFile&) = delete;
     ~LogFile() {
         std::error_code none;
-        fs::remove(path_, none);
+        fs::remove_all(folder_, none);
     }
-    std::string redirection() const { return " 2>" + shell_quoted(path_); }
+    fs::path path() const { return folder_ / "errors.txt"; }
     std::string text() const {
         std::error_code none;
-        if (!fs::exists(path_, none)) return {};
-        std::string text = read_text_file(path_);
+        if (!fs::exists(path(), none)) return {};
+        std::string text = read_text_file(path());
         if (text.size() > kMostLogChars) text.erase(0, text.size() - kMostLogChars);
-        while (text.ends_with('\n')) text.pop_back();
+        while (text.ends_with('\n') || text.ends_with('\r')) text.pop_back();
         return text;
     }
 
   private:
-    fs::path path_;
+    fs::path folder_ = make_scratch_folder("darb_ffmpeg");
 };
 
 // An ffmpeg expression that is not 0 for these pictures. It consists of groups, because ffmpeg
@@ -98,22 +89,30 @@ std::string selection(const std::vector<std::size_t>& pictures) {
                 hint);
 }
 
-// The option of the installed ffmpeg.
-std::string every_picture() {
-    const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
-    std::unique_ptr<std::FILE, decltype(close)> pipe(
-        ::popen("ffmpeg -hide_banner -h long 2>/dev/null", "r"), close);
+// The option of the installed ffmpeg, as words.
+std::vector<std::string> every_picture() {
     std::string help;
-    char part[4096];
-    while (pipe && std::fgets(part, sizeof part, pipe.get())) help += part;
-    return every_picture_option(help);
+    run_process({"ffmpeg", "-hide_banner", "-h", "long"},
+                {.errors = ProcessOptions::Output::nowhere}, &help);
+    const std::string option = every_picture_option(help);
+    const std::size_t space = option.find(' ');
+    return {option.substr(0, space), option.substr(space + 1)};
+}
+
+// "ffmpeg -nostdin -v error FRONT... (the option above) BACK...".
+std::vector<std::string> ffmpeg_words(const std::vector<std::string>& front,
+                                      const std::vector<std::string>& back) {
+    std::vector<std::string> words{"ffmpeg", "-nostdin", "-v", "error"};
+    for (const auto& some : {front, every_picture(), back})
+        words.insert(words.end(), some.begin(), some.end());
+    return words;
 }
 
 }  // namespace
 
 std::string picture_pattern(const fs::path& folder, const std::string& name) {
     std::string pattern;
-    for (const char c : fs::absolute(folder).string())
+    for (const char c : fs::absolute(folder).generic_string())
         pattern += c == '%' ? "%%" : std::string(1, c);
     return pattern + (pattern.ends_with('/') ? "" : "/") + name;
 }
@@ -152,21 +151,23 @@ double laplacian_variance(const unsigned char* grey, int width, int height) {
 std::vector<double> video_sharpness(const fs::path& video) {
     need_ffmpeg(video);
     const LogFile log;
-    const std::string command = fmt::format(
-        "ffmpeg -nostdin -v error -i {} -map 0:v:0 -vf scale={}:{},format=gray "
-        "{} -f rawvideo -{}",
-        shell_quoted(fs::absolute(video)), kProbeWidth, kProbeHeight, every_picture(),
-        log.redirection());
-    const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
-    std::unique_ptr<std::FILE, decltype(close)> pipe(::popen(command.c_str(), "r"), close);
-    if (!pipe) throw Error("ffmpeg", "cannot be started", "Free memory or processes.");
-    std::vector<unsigned char> picture(std::size_t{kProbeWidth} * kProbeHeight);
+    ChildProcess ffmpeg(
+        ffmpeg_words({"-i", fs::absolute(video).string(), "-map", "0:v:0", "-vf",
+                      fmt::format("scale={}:{},format=gray", kProbeWidth, kProbeHeight)},
+                     {"-f", "rawvideo", "-"}),
+        {.output = ProcessOptions::Output::piped, .errors_file = log.path()});
+    std::vector<char> picture(std::size_t{kProbeWidth} * kProbeHeight);
     std::vector<double> sharpness;
-    while (std::fread(picture.data(), 1, picture.size(), pipe.get()) == picture.size())
-        sharpness.push_back(laplacian_variance(picture.data(), kProbeWidth, kProbeHeight));
-    const int status = ::pclose(pipe.release());
-    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || sharpness.empty())
-        ffmpeg_failed(video, log);
+    for (std::size_t filled = 0;;) {
+        const std::size_t count = ffmpeg.read(std::span(picture).subspan(filled)).value_or(0);
+        if (count == 0) break;
+        filled += count;
+        if (filled < picture.size()) continue;
+        filled = 0;
+        sharpness.push_back(laplacian_variance(
+            reinterpret_cast<const unsigned char*>(picture.data()), kProbeWidth, kProbeHeight));
+    }
+    if (!ffmpeg.wait().is_good() || sharpness.empty()) ffmpeg_failed(video, log);
     return sharpness;
 }
 
@@ -192,13 +193,12 @@ void write_video_frames(const fs::path& video, const std::vector<std::size_t>& p
         throw Error(folder.string(), "cannot be made: " + failure.message(),
                     "Choose another output folder with -o.");
     const LogFile log;
-    const std::string command = fmt::format(
-        "ffmpeg -nostdin -v error -y -i {} -map 0:v:0 -vf \"select='{}'\" {} -q:v 2 {}{}",
-        shell_quoted(fs::absolute(video)), selection(pictures), every_picture(),
-        shell_quoted(picture_pattern(folder, "frame_%05d.jpg")), log.redirection());
-    std::FILE* pipe = ::popen(command.c_str(), "r");
-    const int status = pipe == nullptr ? -1 : ::pclose(pipe);
-    if (status == -1 || !WIFEXITED(status) || WEXITSTATUS(status) != 0) ffmpeg_failed(video, log);
+    const ProcessEnd ended =
+        run_process(ffmpeg_words({"-y", "-i", fs::absolute(video).string(), "-map", "0:v:0", "-vf",
+                                  fmt::format("select='{}'", selection(pictures))},
+                                 {"-q:v", "2", picture_pattern(folder, "frame_%05d.jpg")}),
+                    {.errors_file = log.path()});
+    if (!ended.is_good()) ffmpeg_failed(video, log);
 }
 
 }  // namespace darb

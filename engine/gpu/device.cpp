@@ -11,6 +11,7 @@
 #include <optional>
 #include <string_view>
 #include <utility>
+#include "engine/core/system.h"
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
@@ -657,7 +658,7 @@ void separate_mesa_caches(const std::filesystem::path& root) {
         root / ("mesa-width-" + std::string(width != nullptr ? width : "default"));
     std::error_code error;
     std::filesystem::create_directories(folder, error);
-    if (!error) ::setenv("MESA_SHADER_CACHE_DIR", folder.c_str(), 0);
+    if (!error) set_missing_environment("MESA_SHADER_CACHE_DIR", folder.string());
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "engine/core/error.h"
+#include "engine/core/system.h"
 #include "engine/gpu/device.h"
 
 namespace darb {
@@ -30,6 +31,16 @@ std::vector<VkExtensionProperties> offered_extensions(const char* layer) {
 bool contains(const std::vector<VkExtensionProperties>& all, const std::string& name) {
     return std::any_of(all.begin(), all.end(),
                        [&](const VkExtensionProperties& e) { return name == e.extensionName; });
+}
+
+// Vulkan's loader comes with the driver. Elsewhere the program does not start without it.
+void check_loader() {
+#ifdef _WIN32
+    if (!can_load_library("vulkan-1.dll"))
+        throw Error("Vulkan", "vulkan-1.dll is missing, so this computer has no Vulkan driver",
+                    "Install the newest driver of your graphics card, from AMD, Intel or NVIDIA; "
+                    "it brings Vulkan along.");
+#endif
 }
 
 bool validation_installed() {
@@ -86,6 +97,7 @@ void keep_drivers_loaded(const VkApplicationInfo& application, bool portable) {
 
 Instance::Instance(bool validation, const std::vector<std::string>& extensions)
     : messages_(std::make_unique<std::atomic<std::uint64_t>>(0)) {
+    check_loader();
     if (validation && !validation_installed())
         throw Error("Vulkan validation", std::string(kValidationLayer) + " is not installed",
                     "Install vulkan-validationlayers, or run without validation.");

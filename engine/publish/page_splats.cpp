@@ -26,9 +26,10 @@ constexpr std::size_t kSample = 1 << 16;  // bytes used to decide whether differ
 using Values = std::function<double(std::size_t)>;
 
 std::size_t deflated_size(const std::vector<std::byte>& bytes) {
-    std::vector<Bytef> out(compressBound(bytes.size()));
-    uLongf size = out.size();
-    compress2(out.data(), &size, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), 1);
+    std::vector<Bytef> out(compressBound(static_cast<uLong>(bytes.size())));
+    auto size = static_cast<uLongf>(out.size());
+    compress2(out.data(), &size, reinterpret_cast<const Bytef*>(bytes.data()),
+              static_cast<uLong>(bytes.size()), 1);
     return size;
 }
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "engine/core/process.h"
 #include "engine/data/image_io.h"
 #include "engine/data/run_colmap.h"
 #include "engine/scene/ply.h"

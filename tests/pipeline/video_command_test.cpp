@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "engine/core/files.h"
+#include "engine/core/process.h"
 #include "engine/data/run_colmap.h"
 #include "tests/support/fake_programs.h"
 #include "tests/support/run_command.h"

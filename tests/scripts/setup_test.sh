@@ -49,6 +49,8 @@ expect "--with-python names each package once" 0 ' ffmpeg python3-dev pybind11-d
 expect "--with-python adds it without tests" 0 'mesa-vulkan-drivers python3-dev pybind11-dev python3-numpy *$' \
     --no-tests --with-python
 expect "--with-mpi adds it" 0 'libopenmpi-dev openmpi-bin *$' --no-tests --with-mpi
+expect "--with-windows adds a compiler and what runs its programs" 0 'g\+\+-mingw-w64-x86-64-posix .*nsis wine wine64 xvfb *$' \
+    --no-tests --with-windows
 expect "--with-colmap adds it" 0 'mesa-vulkan-drivers colmap *$' --no-tests --with-colmap
 machine "ubuntu 24.04" none=1
 expect "bare Ubuntu lists every package" 0 'to install: g\+\+ cmake .*python3'

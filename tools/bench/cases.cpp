@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "tools/bench/cases.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -14,7 +10,9 @@
 #include <numbers>
 
 #include "engine/core/error.h"
+#include "engine/core/process.h"
 #include "engine/core/rng.h"
+#include "engine/core/system_files.h"
 #include "engine/data/camera_list.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/plan/tuner.h"
@@ -315,8 +313,6 @@ std::vector<BenchCase> sort_cases() {
 // The time from starting the command to the first picture on disk: `darb render` of one view of
 // biker, as a separate process with shader caches in a separate folder.
 
-extern char** environ;
-
 namespace darb {
 
 namespace {
@@ -328,12 +324,7 @@ constexpr int kStarts = 5;
 // A folder that is removed with its content at the end.
 class ScratchFolder {
   public:
-    ScratchFolder() {
-        std::string name = (fs::temp_directory_path() / "darb_bench_XXXXXX").string();
-        if (!mkdtemp(name.data()))
-            throw Error(name, std::strerror(errno), "Set TMPDIR to a folder that can be written.");
-        path_ = name;
-    }
+    ScratchFolder() : path_(make_scratch_folder("darb_bench")) {}
     ~ScratchFolder() {
         std::error_code ignored;
         fs::remove_all(path_, ignored);
@@ -346,39 +337,14 @@ class ScratchFolder {
     fs::path path_;
 };
 
-// Directs the caches of Mesa, of NVIDIA's driver and of darb itself to `caches`.
-std::vector<std::string> environment(const fs::path& caches) {
-    const std::vector<std::string> names = {"XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR",
-                                            "__GL_SHADER_DISK_CACHE_PATH"};
-    std::vector<std::string> all;
-    for (char** one = environ; *one; ++one) {
-        const std::string text = *one;
-        const std::string name = text.substr(0, text.find('='));
-        if (std::find(names.begin(), names.end(), name) == names.end()) all.push_back(text);
-    }
-    for (const std::string& name : names) all.push_back(name + "=" + caches.string());
-    return all;
-}
-
-std::vector<char*> pointers(std::vector<std::string>& texts) {
-    std::vector<char*> result;
-    for (std::string& text : texts) result.push_back(text.data());
-    result.push_back(nullptr);
-    return result;
-}
-
-void run_process(std::vector<std::string> arguments, std::vector<std::string> variables) {
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-    pid_t process = 0;
-    const int failure = posix_spawn(&process, arguments[0].c_str(), &actions, nullptr,
-                                    pointers(arguments).data(), pointers(variables).data());
-    posix_spawn_file_actions_destroy(&actions);
-    int status = 0;
-    if (failure != 0 || waitpid(process, &status, 0) != process || status != 0)
-        throw Error(arguments[0] + " " + arguments[1],
-                    failure != 0 ? std::strerror(failure) : "did not draw its picture",
+// With the caches of Mesa, of NVIDIA's driver and of darb itself in `caches`.
+void draw(const std::vector<std::string>& words, const fs::path& caches) {
+    ProcessOptions options{.output = ProcessOptions::Output::nowhere};
+    for (const char* name :
+         {"XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH"})
+        options.variables.emplace_back(name, caches.string());
+    if (!run_process(words, options).is_good())
+        throw Error(words[0] + " " + words[1], "did not draw its picture",
                     "Run the command by hand; see what it says above.");
 }
 
@@ -411,7 +377,7 @@ BenchResult measure(const Device& device, const BenchOptions& options, const fs:
     take_samples(
         sampling, 1,
         [&] {
-            run_process(command, environment(caches));
+            draw(command, caches);
             return std::vector<PassTime>{};
         },
         result,

@@ -56,7 +56,13 @@ namespace baseline {
 #undef DARB_LANES
 }  // namespace baseline
 
-#if defined(__x86_64__)
+// GCC for Windows puts vectors of more than 16 bytes on the stack wherever it likes, and loads them
+// as if they were aligned (GCC's bug 54412).
+#if defined(__x86_64__) && !defined(__MINGW32__)
+#define DARB_WIDE_VECTORS
+#endif
+
+#if defined(DARB_WIDE_VECTORS)
 #if defined(__clang__)
 #pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
 #else
@@ -88,7 +94,7 @@ namespace avx512 {
 #endif
 
 Instructions best_instructions() {
-#if defined(__x86_64__)
+#if defined(DARB_WIDE_VECTORS)
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("fma"))

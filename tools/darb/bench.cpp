@@ -15,6 +15,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
+#include "engine/core/system.h"
 #include "engine/gpu/device.h"
 #include "engine/plan/effect_plan.h"
 #include "tools/bench/bench_report.h"
@@ -95,7 +96,7 @@ int bench(BenchFlags flags) {
     options.data = bench_data_folder(flags.data, usual != nullptr ? usual : "../shared/data");
     options.device = flags.device;
     flags.growth.plan.sampling = options.sampling;
-    options.program = std::filesystem::read_symlink("/proc/self/exe");
+    options.program = program_file();
     options.plan_training = [](Dataset& dataset, const std::vector<ImageU8>& photos,
                                TrainOptions& train) {
         const EffectPlan plan = plan_training(dataset, photos, train.sh_degree);

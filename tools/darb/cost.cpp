@@ -2,7 +2,6 @@
 // darb cost SCENE.ply [DATASET]: the time that each accuracy setting costs and the accuracy that it
 // gains.
 #include <fmt/format.h>
-#include <unistd.h>
 #include <filesystem>
 #include <memory>
 #include <string>

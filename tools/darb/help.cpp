@@ -2,14 +2,13 @@
 #include "tools/darb/help.h"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 #include <algorithm>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <sstream>
 
+#include "engine/core/system.h"
 #include "trainer/options/option_table.h"
 
 namespace darb {
@@ -19,12 +18,11 @@ namespace {
 constexpr std::size_t kNames = 30;  // columns for the names of options
 
 std::size_t terminal_width() {
-    winsize size{};
     long columns = 80;
     if (const char* given = std::getenv("COLUMNS"))
         columns = std::strtol(given, nullptr, 10);
-    else if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0)
-        columns = size.ws_col;
+    else if (const int shown = terminal_columns(); shown > 0)
+        columns = shown;
     return static_cast<std::size_t>(std::clamp(columns, 60L, 100L));
 }
 

@@ -18,11 +18,11 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/core/system.h"
 #include "engine/ranks/ranks.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/flags.h"
 #include "tools/darb/help.h"
-#include "tools/darb/stop_signals.h"
 
 namespace {
 
@@ -32,8 +32,7 @@ std::string with_mpi() {
 }
 
 // 3DGS spells options with underscores, which mean the same as dashes here.
-std::vector<std::string> with_dashes(int argc, char** argv) {
-    std::vector<std::string> arguments(argv + 1, argv + argc);
+std::vector<std::string> with_dashes(std::vector<std::string> arguments) {
     for (std::string& argument : arguments) {
         if (argument.rfind("--", 0) != 0) continue;
         const size_t end = std::min(argument.find_first_of("= "), argument.size());
@@ -73,8 +72,8 @@ int show_help(const CLI::App& app, const CLI::ParseError& asked) {
     return code;
 }
 
-int run(int argc, char** argv) {
-    std::vector<std::string> arguments = with_dashes(argc, argv);
+int run(const std::vector<std::string>& words) {
+    std::vector<std::string> arguments = with_dashes({words.begin() + 1, words.end()});
     join_effects(arguments);
     darb::refuse_empty_values(arguments);
     CLI::App app(
@@ -117,11 +116,12 @@ int report(const std::system_error& e) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    const std::vector<std::string> words = darb::command_words(argc, argv);
     darb::keep_standard_descriptors();
     darb::fail_at_the_file_limit();
     darb::go_on_without_readers();
     try {
-        const int code = run(argc, argv);
+        const int code = run(words);
         darb::tell_text("");  // writes what is left in the buffer
         return code;
     } catch (const darb::Error& e) {
@@ -136,7 +136,7 @@ int main(int argc, char** argv) {
     } catch (const std::bad_alloc&) {
         darb::say(
             "error: darb {}: no memory is left\n  Close other programs, or give it less work.\n",
-            argc > 1 ? argv[1] : "");
+            words.size() > 1 ? words[1] : "");
         return 2;
     } catch (const std::exception& e) {
         darb::say("internal error: {}\n", e.what());

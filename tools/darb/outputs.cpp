@@ -2,7 +2,6 @@
 #include "tools/darb/outputs.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -15,6 +14,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
+#include "engine/core/system_files.h"
 #include "engine/core/user_folders.h"
 #include "trainer/job/scene_file.h"
 #include "trainer/run/run_folder.h"
@@ -25,14 +25,11 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Identity = std::pair<dev_t, ino_t>;
-
-// Whether `path` is an existing regular file; `identity` then becomes that file's.
-bool identify(const fs::path& path, Identity& identity) {
-    struct stat facts {};
-    if (::stat(path.c_str(), &facts) != 0 || !S_ISREG(facts.st_mode)) return false;
-    identity = {facts.st_dev, facts.st_ino};
-    return true;
+// Whether `path` is a regular file that is there; `identity` then becomes the file's.
+bool identify(const fs::path& path, FileId& identity) {
+    const FileFacts facts = file_facts(path);
+    identity = facts.id;
+    return facts.kind == FileKind::regular;
 }
 
 bool counts(const fs::path& path) {
@@ -134,9 +131,9 @@ Paths outputs_of(const fs::path& output, const EncodedSplats& encoded) {
 }
 
 void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs, Replaces replaces) {
-    std::map<Identity, fs::path> there;  // the outputs that exist
+    std::map<FileId, fs::path> there;  // the outputs that exist
     std::map<fs::path, bool> named;
-    Identity identity;
+    FileId identity{};
     for (const fs::path& output : outputs) {
         if (!counts(output)) continue;
         std::error_code none;
@@ -171,11 +168,10 @@ std::string whole_name(const fs::path& path) {
 
 /// Size and time of the last change; the work of another program shows in one of them.
 bool stamp_of(const fs::path& path, std::int64_t& bytes, std::int64_t& changed_ns) {
-    struct stat facts {};
-    if (::stat(path.c_str(), &facts) != 0 || !S_ISREG(facts.st_mode)) return false;
-    bytes = facts.st_size;
-    changed_ns = std::int64_t{facts.st_mtim.tv_sec} * 1'000'000'000 + facts.st_mtim.tv_nsec;
-    return true;
+    const FileFacts facts = file_facts(path);
+    bytes = std::int64_t(facts.bytes);
+    changed_ns = facts.changed_ns;
+    return facts.kind == FileKind::regular;
 }
 
 /// The list of written files; empty where there is none or the file is something else.

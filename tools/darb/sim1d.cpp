@@ -2,7 +2,6 @@
 // darb sim1d: the paper's one-dimensional study of kernels.
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <memory>
 #include <sstream>
@@ -10,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
+#include "engine/core/system.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/flags.h"
 #include "tools/darb/outputs.h"
@@ -60,7 +60,7 @@ int sim1d(Sim1dFlags flags) {
     refuse_to_overwrite_inputs({flags.json, flags.html}, flags.kernel_files);
     flags.study.kernels = kernels_1d_from_list(flags.kernels, flags.kernel_files);
     flags.study.signals = signals_from_list(flags.signals);
-    const bool shown = !flags.quiet && ::isatty(STDERR_FILENO) == 1;
+    const bool shown = !flags.quiet && is_terminal(stderr);
     const Study1dResult result = study_1d(flags.study, [&](std::size_t done, std::size_t all) {
         if (shown && (done % 20 == 0 || done == all))
             say_text(fmt::format("\r{} of {} runs{}", done, all, done == all ? "\n" : ""));

@@ -17,6 +17,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/core/system.h"
 #include "engine/core/text.h"
 #include "engine/data/run_colmap.h"
 #include "engine/gpu/device.h"
@@ -28,7 +29,6 @@
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/page_output.h"
 #include "tools/darb/scene_evaluation.h"
-#include "tools/darb/stop_signals.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
 #include "tools/darb/train_summary.h"

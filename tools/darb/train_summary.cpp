@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
+#include "engine/core/system.h"
 #include "engine/core/text.h"
 #include "engine/ranks/ranks.h"
-#include "tools/darb/stop_signals.h"
 
 namespace darb {
 

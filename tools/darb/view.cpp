@@ -18,6 +18,7 @@
 #include "engine/core/files.h"
 #include "engine/core/quantile.h"
 #include "engine/core/say.h"
+#include "engine/core/system.h"
 #include "engine/core/text.h"
 #include "engine/core/user_folders.h"
 #include "engine/data/image_io.h"
@@ -31,7 +32,6 @@
 #include "tools/darb/flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/stop_signals.h"
 #include "trainer/job/scene_file.h"
 #include "viewer/controls.h"
 #include "viewer/picture_pacing.h"
@@ -374,14 +374,6 @@ namespace {
 
 constexpr double kMotion_s = 5;  // time of the orbit
 constexpr int kRests = 5;
-
-/// "VmHWM", the peak memory of the process in bytes; 0 where the system does not tell.
-double peak_memory_bytes() {
-    if (!std::filesystem::exists("/proc/self/status")) return 0;
-    const std::string text = read_text_file("/proc/self/status");
-    const size_t at = text.find("VmHWM:");
-    return at == std::string::npos ? 0 : 1024 * std::stod(text.substr(at + 6));
-}
 
 // Measures several rests after small turns.
 nlohmann::ordered_json rests_json(ViewerWindow& window, const MeasuredView& measured) {

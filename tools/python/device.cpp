@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "tools/python/device.h"
 
-#include <unistd.h>
-
+#include "engine/core/system.h"
 #include "engine/gpu/device.h"
 #include "engine/plan/tuner.h"
 
@@ -45,14 +44,14 @@ KeptRenderer& Renderers::make(Device& device, const RendererKey& key, const Spla
     return kept_.front();
 }
 
-PyDevice::PyDevice(const std::string& select) : process_(::getpid()) {
+PyDevice::PyDevice(const std::string& select) : process_(process_id()) {
     DeviceOptions options = command_device(select);
     device_ = std::make_unique<Device>(options);
     settle_tuning(*device_);
 }
 
 std::unique_lock<std::recursive_timed_mutex> PyDevice::lock() {
-    if (::getpid() != process_)
+    if (process_id() != process_)
         throw Error(info().name, "was opened before this process was forked",
                     "Start worker processes with multiprocessing's \"spawn\", or open the device "
                     "in each.");
@@ -63,13 +62,13 @@ std::unique_lock<std::recursive_timed_mutex> PyDevice::lock() {
 
 void PyDevice::let_go(const std::function<void()>& free_it,
                       const std::function<void()>& leave_it) noexcept {
-    if (::getpid() != process_) return leave_it();
+    if (process_id() != process_) return leave_it();
     const std::scoped_lock guard(mutex_);
     free_it();
 }
 
 PyDevice::~PyDevice() {
-    if (::getpid() == process_) return;
+    if (process_id() == process_) return;
     renderers_.leak();
     static_cast<void>(device_.release());
 }

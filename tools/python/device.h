@@ -3,8 +3,6 @@
 // keeps the renderers that calls with arrays make for the next call of the same kind.
 #pragma once
 
-#include <sys/types.h>
-
 #include <chrono>
 #include <functional>
 #include <list>
@@ -77,7 +75,7 @@ class PyDevice {
 
   private:
     std::recursive_timed_mutex mutex_;
-    pid_t process_;
+    int process_;
     std::unique_ptr<Device> device_;
     Renderers renderers_;
     std::uint64_t pictures_ = 0;

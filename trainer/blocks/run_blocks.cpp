@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cinttypes>
 #include <cmath>
 #include <cstring>
 #include <numeric>
@@ -356,7 +357,7 @@ void BlocksRun::exchange_records() {
         at[rank] += std::strlen(text) + 1;
         PartRecord p;
         int state = 0, read = 0;
-        std::sscanf(text, "%d %u %u %u %lu %lf %n", &state, &p.frozen, &p.splats, &p.kept,
+        std::sscanf(text, "%d %u %u %u %" SCNu64 " %lf %n", &state, &p.frozen, &p.splats, &p.kept,
                     &p.peak_bytes, &p.seconds, &read);
         p.state = static_cast<PartState>(state);
         p.error = text + read;

@@ -132,7 +132,7 @@ PhotoList list_photos(const fs::path& folder) {
     for (const fs::directory_entry& entry : found.photos) {
         const ImageInfo info = read_image_info(entry.path());
         sizes.insert({info.width, info.height});
-        list.names.push_back(fs::relative(entry.path(), folder).string());
+        list.names.push_back(fs::relative(entry.path(), folder).generic_string());
         times.push_back(exif_time(read_file_head(entry.path(), kHeadBytes)));
         lines.push_back(fmt::format("{} bytes {}\n", entry.file_size(), list.names.back()));
     }

@@ -85,7 +85,7 @@ void take_accuracy(Request& r, Text text) {
 }
 
 std::string path_in_file(const Request& r, const fs::path& path) {
-    return path.empty() ? std::string() : seen_from(r.output, path).string();
+    return path.empty() ? std::string() : seen_from(r.output, path).generic_string();
 }
 
 fs::path path_of_file(const Request& r, Text text) {
@@ -95,7 +95,7 @@ fs::path path_of_file(const Request& r, Text text) {
 // What the photos' folder is called beside a data set that moves with the run.
 std::string shared_images(const Request& r) {
     const fs::path images = r.data.images_folder;
-    return images.is_absolute() ? seen_from(r.dataset, images).string() : images.string();
+    return (images.is_absolute() ? seen_from(r.dataset, images) : images).generic_string();
 }
 
 std::string preset_help() {

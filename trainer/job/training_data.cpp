@@ -2,7 +2,6 @@
 #include "trainer/job/training_data.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -14,7 +13,9 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/process.h"
 #include "engine/core/say.h"
+#include "engine/core/system.h"
 #include "engine/core/text.h"
 #include "engine/data/colmap.h"
 #include "engine/data/masks.h"
@@ -112,7 +113,7 @@ void check_output(const fs::path& photos, const fs::path& output) {
 /// What COLMAP is at: a line in place on a terminal, else one now and then.
 class ColmapScreen {
   public:
-    explicit ColmapScreen(bool quiet) : quiet_(quiet), terminal_(::isatty(STDERR_FILENO) == 1) {}
+    explicit ColmapScreen(bool quiet) : quiet_(quiet), terminal_(is_terminal(stderr)) {}
     ~ColmapScreen() { clear(); }
     ColmapScreen(const ColmapScreen&) = delete;
     ColmapScreen& operator=(const ColmapScreen&) = delete;

@@ -2,7 +2,6 @@
 #include "trainer/run/forecast.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "engine/core/memory.h"
 #include "engine/core/rng.h"
 #include "engine/core/scope_guard.h"
+#include "engine/core/system.h"
 #include "engine/raster/gpu_splats.h"
 #include "trainer/growth/initial_model.h"
 #include "trainer/growth/predicted_growth.h"
@@ -338,16 +338,6 @@ constexpr std::uint64_t kPointBytes = 3 * (8 + 1);
 // distance to its neighbours, and its part of the search tree.
 constexpr std::uint64_t kSplatBytes = splat_floats(0) * sizeof(float) + 8 + 16;
 
-// The address space of this process, or the largest possible where the system does not tell.
-std::uint64_t address_space() {
-    std::ifstream lines("/proc/self/status");
-    for (std::string key; lines >> key; lines.ignore(1'000, '\n')) {
-        std::uint64_t kilobytes = 0;
-        if (key == "VmSize:" && lines >> kilobytes) return kilobytes * 1024;
-    }
-    return std::numeric_limits<std::uint64_t>::max();
-}
-
 MemoryDemand demand_at_start(const Device& device, const Dataset& dataset, const Schedule& schedule,
                              std::uint32_t splats) {
     MemoryDemand demand;
@@ -363,13 +353,7 @@ MemoryDemand demand_at_start(const Device& device, const Dataset& dataset, const
 }  // namespace
 
 std::uint64_t free_host_bytes() {
-    std::uint64_t bytes = free_memory();
-    rlimit limit{};
-    if (::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) {
-        const std::uint64_t used = address_space();
-        bytes = std::min<std::uint64_t>(bytes, limit.rlim_cur > used ? limit.rlim_cur - used : 0);
-    }
-    return bytes;
+    return std::min(free_memory(), address_space_left());
 }
 
 void check_start_memory(const Device& device, const Dataset& dataset, const Schedule& schedule,

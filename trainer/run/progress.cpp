@@ -2,12 +2,12 @@
 #include "trainer/run/progress.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "engine/core/say.h"
+#include "engine/core/system.h"
 #include "trainer/options/schedule.h"
 #include "trainer/options/strategy.h"
 #include "trainer/step/held_out_gain.h"
@@ -233,7 +233,7 @@ Progress::Progress(int first_iteration, int last_iteration, bool quiet)
     : first_(first_iteration),
       last_(last_iteration),
       quiet_(quiet),
-      terminal_(::isatty(STDERR_FILENO) == 1),
+      terminal_(is_terminal(stderr)),
       start_(Clock::now()),
       last_print_(start_),
       begin_(start_) {}

@@ -1,21 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "trainer/run/run_folder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <regex>
 #include <set>
 #include <string_view>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/system.h"
 
 namespace darb {
 
@@ -42,60 +37,44 @@ bool is_numbered(const std::string& name, std::string_view before, std::string_v
                        [](unsigned char c) { return c >= '0' && c <= '9'; });
 }
 
-std::string host_name() {
-    std::array<char, 256> name{};
-    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
-}
-
 // What the holder wrote, or how to find out.
-std::string holder_of(int file) {
-    std::string text(kLongestHolder, '\0');
-    const ssize_t got = ::pread(file, text.data(), text.size(), 0);
-    text.resize(got > 0 ? static_cast<size_t>(got) : 0);
+std::string holder_of(File& file) {
+    std::string text = file.head(kLongestHolder);
     text.resize(std::min(text.find('\n'), text.size()));
     return text.empty() ? kNobody : text;
 }
 
-bool is_still_there(int file, const fs::path& path) {
-    struct stat open_one {
-    }, named{};
-    return ::fstat(file, &open_one) == 0 && ::stat(path.c_str(), &named) == 0 &&
-           open_one.st_dev == named.st_dev && open_one.st_ino == named.st_ino;
+bool is_still_there(const File& file, const fs::path& path) {
+    const FileFacts own = file.facts(), named = file_facts(path);
+    return own.kind != FileKind::none && named.kind != FileKind::none && own.id == named.id;
 }
 
 }  // namespace
 
 RunLock::RunLock(const fs::path& folder) : path_(folder / kLockFile) {
+    check_file_name(folder);
     std::error_code ignored;  // opening says why
     fs::create_directories(folder, ignored);
-    for (;;) {
-        file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-        if (file_ < 0)
-            throw Error(path_.string(), std::string("cannot be written: ") + std::strerror(errno),
+    do {
+        file_ = File(path_, File::Open::lock);
+        if (!file_.is_open())
+            throw Error(path_.string(), "cannot be written: " + file_.error().message(),
                         "Choose another output folder with -o.");
-        if (::flock(file_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-            const std::string holder = holder_of(file_);
-            ::close(file_);
-            throw Error(folder.string(), "another run writes there: " + holder,
+        if (!file_.lock())
+            throw Error(folder.string(), "another run writes there: " + holder_of(file_),
                         "Wait until it has ended, or name another output folder with -o.");
-        }  // else: a file system without locks
-        if (is_still_there(file_, path_)) break;
-        ::close(file_);  // the last holder has just removed it
-    }
+    } while (!is_still_there(file_, path_));  // the last holder has just removed it
     if (const std::string before = holder_of(file_);
-        !before.starts_with(kHolder) && before != kNobody) {
-        ::close(file_);
+        !before.starts_with(kHolder) && before != kNobody)
         throw Error(path_.string(), "is no lock of this program, which would remove it",
                     "Move it, or name another output folder with -o.");
-    }
-    const std::string holder = fmt::format("{}{} on {}\n", kHolder, ::getpid(), host_name());
-    if (::ftruncate(file_, 0) == 0)  // it only tells people
-        (void)!::pwrite(file_, holder.data(), holder.size(), 0);
+    // It only tells people.
+    file_.replace_content(fmt::format("{}{} on {}\n", kHolder, process_id(), host_name()));
 }
 
 RunLock::~RunLock() {
-    ::unlink(path_.c_str());
-    ::close(file_);
+    std::error_code none;
+    fs::remove(path_, none);
 }
 
 bool is_of_run(const fs::path& path) {
@@ -113,10 +92,10 @@ void set_aside(const fs::path& output) {
     fs::path earlier;
     for (int number = 1;; ++number) {
         earlier = output / fmt::format("earlier.{}", number);
-        if (::mkdir(earlier.c_str(), 0777) == 0) break;
-        if (errno != EEXIST)
-            throw Error(earlier.string(), std::string("cannot be made: ") + std::strerror(errno),
-                        kOtherFolder);
+        std::error_code failed;
+        if (fs::create_directory(earlier, failed)) break;
+        if (failed && !fs::exists(fs::symlink_status(earlier, none)))
+            throw Error(earlier.string(), "cannot be made: " + failed.message(), kOtherFolder);
     }
     for (const fs::path& path : found) {
         std::error_code failed;  // the folder is new: nothing is replaced
@@ -253,16 +232,33 @@ std::string shared_name(const fs::path& folder, const fs::path& path) {
     const fs::path seen = seen_from(folder, path), from = place_of(whole(folder));
     const auto up = std::count(seen.begin(), seen.end(), fs::path(".."));
     const auto depth = std::distance(from.begin(), from.end()) - 1;  // without the root
-    return seen.is_absolute() || up >= depth ? whole(path).filename().string() : seen.string();
+    return seen.is_absolute() || up >= depth ? whole(path).filename().string()
+                                             : seen.generic_string();
 }
+
+namespace {
+
+bool is_slash(char c) {
+    return c == '/' || c == fs::path::preferred_separator;
+}
+
+// A path as the system writes it, and with slashes where that is something else.
+std::vector<std::string> spellings(const fs::path& path) {
+    std::vector<std::string> all{path.string()};
+    if (path.generic_string() != all[0]) all.push_back(path.generic_string());
+    return all;
+}
+
+}  // namespace
 
 std::string without_folders(std::string text, const fs::path& path) {
     const std::string name = whole(path).filename().string();
     if (name.empty()) return text;
-    replace_all(text, whole(path).string(), name);
-    std::string typed = path.string();
-    while (typed.size() > 1 && typed.ends_with('/')) typed.pop_back();
-    if (typed.find('/') != std::string::npos) replace_all(text, typed, name);
+    for (const fs::path& one : {whole(path), path})
+        for (std::string typed : spellings(one)) {
+            while (typed.size() > 1 && is_slash(typed.back())) typed.pop_back();
+            if (std::any_of(typed.begin(), typed.end(), is_slash)) replace_all(text, typed, name);
+        }
     return text;
 }
 

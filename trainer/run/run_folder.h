@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/system_files.h"
 #include "engine/data/dataset.h"
 
 namespace darb {
@@ -24,7 +25,7 @@ class RunLock {
 
   private:
     std::filesystem::path path_;
-    int file_ = -1;
+    File file_;
 };
 
 /// What a run writes into its folder, as names of files and folders there.

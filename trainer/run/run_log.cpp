@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "trainer/run/run_log.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
@@ -12,6 +9,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/system.h"
 #include "engine/core/text.h"
 #include "engine/data/image_io.h"
 #include "engine/data/run_events.h"
@@ -63,22 +61,6 @@ Json culled_json(const TrainCounters& counters) {
     return culled;
 }
 
-double peak_host_bytes() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return static_cast<double>(usage.ru_maxrss) * 1024.0;
-}
-
-// Whole, in as many writes as it takes.
-bool append(int file, std::string_view line) {
-    while (!line.empty()) {
-        const ssize_t wrote = ::write(file, line.data(), line.size());
-        if (wrote < 0 && errno != EINTR) return false;
-        if (wrote > 0) line.remove_prefix(static_cast<std::size_t>(wrote));
-    }
-    return true;
-}
-
 }  // namespace
 
 std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
@@ -87,9 +69,10 @@ std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
     return fmt::format(
         "Namespace(sh_degree={}, source_path={}, model_path={}, images={}, "
         "resolution={}, white_background={}, data_device='cpu', eval={})",
-        options.sh_degree, python_string(seen_from(output, dataset.root).string()),
+        options.sh_degree, python_string(seen_from(output, dataset.root).generic_string()),
         python_string("."),
-        python_string((images.is_absolute() ? seen_from(dataset.root, images) : images).string()),
+        python_string(
+            (images.is_absolute() ? seen_from(dataset.root, images) : images).generic_string()),
         dataset.options.resolution, options.white_background ? "True" : "False",
         std::any_of(dataset.views.begin(), dataset.views.end(),
                     [](const View& v) { return v.is_test; })
@@ -99,9 +82,9 @@ std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
 
 void RunLog::open() {
     const auto path = folder_ / "run.jsonl";
-    file_.reset(std::fopen(path.c_str(), "abe"));
-    if (!file_)
-        throw Error(path.string(), std::string("cannot be written: ") + std::strerror(errno),
+    file_ = File(path, File::Open::append);
+    if (!file_.is_open())
+        throw Error(path.string(), "cannot be written: " + file_.error().message(),
                     "Choose another output folder with -o.");
 }
 
@@ -127,9 +110,9 @@ std::string RunLog::shared_text(const std::string& text) const {
 
 void RunLog::write(const Json& event) {
     const std::string line = text_of(event) + "\n";
-    if (!append(::fileno(file_.get()), line))
+    if (!file_.write(std::as_bytes(std::span(line))))
         throw Error((folder_ / "run.jsonl").string(),
-                    std::string("cannot be written: ") + std::strerror(errno),
+                    "cannot be written: " + file_.error().message(),
                     "Free space; the last checkpoint is intact, go on with --resume.");
     events_.push_back(event);
 }
@@ -392,7 +375,7 @@ std::filesystem::path RunLog::finish(const TrainResult& summary, const Trainer& 
                  {"passes_ms", passes},
                  {"peak_device_bytes", device.peak_bytes()},
                  {"planned_device_bytes", trainer.planned_bytes()},
-                 {"peak_host_bytes", peak_host_bytes()},
+                 {"peak_host_bytes", peak_memory_bytes()},
                  {"redone_iterations", c.redone_iterations},
                  {"overflows", c.overflows},
                  {"longest_list", c.longest_list},

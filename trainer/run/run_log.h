@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/system_files.h"
 #include "engine/plan/roofline.h"
 #include "trainer/run/run.h"
 #include "trainer/run/run_report.h"
@@ -79,7 +80,7 @@ class RunLog {
 
     std::filesystem::path folder_, root_;  // the run's and the data set's
     std::vector<nlohmann::json> events_;
-    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_{nullptr, &std::fclose};
+    File file_;
     double loss_sum_ = 0, psnr_sum_ = 0;
     int summed_ = 0;
     FrameCounts counts_;  // sums over counted_ iterations

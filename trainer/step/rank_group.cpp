@@ -10,6 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/system.h"
 #include "engine/plan/tuner.h"
 
 namespace darb {
@@ -47,8 +48,7 @@ std::string what_differs(const std::string& text, const std::string& other) {
 }  // namespace
 
 RankFacts rank_facts() {  // hashes the program, as one version has many builds
-    return {
-        {"program", fmt::format("{} ({})", DARB_VERSION, fact_of(read_file("/proc/self/exe")))}};
+    return {{"program", fmt::format("{} ({})", DARB_VERSION, fact_of(read_file(program_file())))}};
 }
 
 RankFacts rank_facts(const Device& device) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which pictures of a video are kept.
 #include "engine/data/video.h"
+#include "engine/core/process.h"
 
 #include <gtest/gtest.h>
 
