@@ -56,7 +56,7 @@ std::uint32_t end_by_photos(const Schedule& schedule, const GrowthStart& start) 
     const int rounds = std::max(0, last - first);
     const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
     const double most = std::min(growth * start.splats, static_cast<double>(start.limit));
-    const double threshold = options.densify_grad_threshold;
+    const double threshold = schedule.options.densify_grad_threshold;
     const auto end = static_cast<std::uint32_t>(std::min(splats_wanted(start, threshold), most));
     return start.random && rounds > 0 ? end : std::max(start.splats, end);
 }
