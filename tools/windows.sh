@@ -125,7 +125,7 @@ configure() {
     # Unity builds as in the preset release; the letters of the viewer's panels come from Linux's package.
     cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_TOOLCHAIN_FILE="$PWD/cmake/mingw.cmake" \
         -DDARB_WINDOWS_PREFIX="$libraries" -DCMAKE_PREFIX_PATH="$libraries" -DCMAKE_UNITY_BUILD=ON \
-        -DCMAKE_UNITY_BUILD_BATCH_SIZE=12 -DDARB_MPI=OFF -DDARB_EXAMPLES=OFF "$@" >"$build/configure.log" 2>&1 ||
+        -DCMAKE_UNITY_BUILD_BATCH_SIZE=12 -DDARB_MPI=OFF -DGUI_FONT=/usr/share/fonts/truetype/roboto/unhinted/RobotoTTF/Roboto-Regular.ttf -DDARB_EXAMPLES=OFF "$@" >"$build/configure.log" 2>&1 ||
         { cat "$build/configure.log" >&2; exit 1; }
 }
 

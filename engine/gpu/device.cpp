@@ -563,13 +563,16 @@ std::vector<ListedDevice> list_devices(const Instance& instance) {
     return all;
 }
 
-std::vector<DeviceInfo> list_devices() try {
-    const Instance instance(false, {});
-    std::vector<DeviceInfo> infos;
-    for (ListedDevice& device : list_devices(instance)) infos.push_back(std::move(device.info));
-    return infos;
-} catch (const Error&) {
-    return {};
+std::vector<DeviceInfo> list_devices() {
+    check_vulkan_loader();
+    try {
+        const Instance instance(false, {});
+        std::vector<DeviceInfo> infos;
+        for (ListedDevice& device : list_devices(instance)) infos.push_back(std::move(device.info));
+        return infos;
+    } catch (const Error&) {
+        return {};
+    }
 }
 
 std::string describe_choice(const DeviceInfo& chosen, const std::vector<std::string>& others) {
@@ -582,12 +585,16 @@ std::string describe_choice(const DeviceInfo& chosen, const std::vector<std::str
     return text;
 }
 
+#ifdef _WIN32
+constexpr const char* kGetDriver = "Install the newest driver of your graphics card.";
+#else
+constexpr const char* kGetDriver = "Install a driver: mesa-vulkan-drivers has one for every CPU.";
+#endif
+
 std::size_t choose_device(const std::vector<DeviceInfo>& devices, const std::string& select) {
     const std::string where = select.empty() ? "device" : "--device " + select;
     const std::string hint = "See darb devices.";
-    if (devices.empty())
-        throw Error(where, "there is no Vulkan device",
-                    "Install a driver: mesa-vulkan-drivers has one for every CPU.");
+    if (devices.empty()) throw Error(where, "there is no Vulkan device", kGetDriver);
     std::vector<std::size_t> candidates;
     if (const auto index = parse_index(select)) {
         if (*index >= devices.size())

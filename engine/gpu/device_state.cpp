@@ -33,16 +33,6 @@ bool contains(const std::vector<VkExtensionProperties>& all, const std::string& 
                        [&](const VkExtensionProperties& e) { return name == e.extensionName; });
 }
 
-// Vulkan's loader comes with the driver. Elsewhere the program does not start without it.
-void check_loader() {
-#ifdef _WIN32
-    if (!can_load_library("vulkan-1.dll"))
-        throw Error("Vulkan", "vulkan-1.dll is missing, so this computer has no Vulkan driver",
-                    "Install the newest driver of your graphics card, from AMD, Intel or NVIDIA; "
-                    "it brings Vulkan along.");
-#endif
-}
-
 bool validation_installed() {
     std::uint32_t count = 0;
     vkEnumerateInstanceLayerProperties(&count, nullptr);
@@ -95,9 +85,18 @@ void keep_drivers_loaded(const VkApplicationInfo& application, bool portable) {
 
 }  // namespace
 
+void check_vulkan_loader() {
+#ifdef _WIN32
+    if (!can_load_library("vulkan-1.dll"))
+        throw Error("Vulkan", "vulkan-1.dll is missing, so this computer has no Vulkan driver",
+                    "Install the newest driver of your graphics card, from AMD, Intel or NVIDIA; "
+                    "it brings Vulkan along.");
+#endif
+}
+
 Instance::Instance(bool validation, const std::vector<std::string>& extensions)
     : messages_(std::make_unique<std::atomic<std::uint64_t>>(0)) {
-    check_loader();
+    check_vulkan_loader();
     if (validation && !validation_installed())
         throw Error("Vulkan validation", std::string(kValidationLayer) + " is not installed",
                     "Install vulkan-validationlayers, or run without validation.");

@@ -59,6 +59,9 @@ struct ListedDevice {
 };
 
 /// All devices, best first, indices set.
+/// Throws Error where Vulkan's loader, which comes with the driver, is missing: on Windows alone,
+/// as elsewhere the program does not start without it.
+void check_vulkan_loader();
 std::vector<ListedDevice> list_devices(const Instance& instance);
 
 std::string hex(std::span<const std::uint8_t> bytes);
