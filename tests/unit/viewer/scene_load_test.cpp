@@ -56,7 +56,7 @@ TEST_F(SceneLoadTest, What_is_no_file_is_refused_by_its_kind) {
         {make_link("device.ply", "/dev/zero"), "device"},
         {folder_ / "empty", "folder"},
         {folder_ / "sog", "folder"},
-        {folder_ / "none.ply", "not there"}};
+        {folder_ / "none.ply", "does not exist"}};
     for (const auto& [path, what] : cases) {
         SceneLoader loader(nullptr, nullptr);
         loader.start(path, true);
