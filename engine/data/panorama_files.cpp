@@ -19,13 +19,13 @@ namespace darb {
 
 namespace {
 
-using Bytes = std::vector<std::byte>;
+using PanoramaBytes = std::vector<std::byte>;
 
-void append(Bytes& to, std::string_view text) {
+void append(PanoramaBytes& to, std::string_view text) {
     for (const char c : text) to.push_back(static_cast<std::byte>(c));
 }
 
-void append_u32(Bytes& to, std::uint32_t value) {
+void append_u32(PanoramaBytes& to, std::uint32_t value) {
     for (int shift = 24; shift >= 0; shift -= 8)
         to.push_back(static_cast<std::byte>(value >> shift & 0xFF));
 }
@@ -37,7 +37,7 @@ std::uint32_t u32_at(std::span<const std::byte> bytes, std::size_t at) {
     return value;
 }
 
-void put_u32(Bytes& bytes, std::size_t at, std::uint32_t value) {
+void put_u32(PanoramaBytes& bytes, std::size_t at, std::uint32_t value) {
     for (std::size_t i = 0; i < 4; ++i)
         bytes[at + i] = static_cast<std::byte>(value >> (24 - 8 * i) & 0xFF);
 }
@@ -109,13 +109,13 @@ bool is_video(std::span<const std::byte> file, const Box& track) {
 }  // namespace
 
 std::vector<std::byte> encode_panorama_png(const ImageU8& image) {
-    Bytes file = encode_png(image);
+    PanoramaBytes file = encode_png(image);
     // An iTXt chunk: keyword, 0, not compressed, method 0, no language, no translation, text.
-    Bytes chunk;
+    PanoramaBytes chunk;
     append(chunk, "iTXtXML:com.adobe.xmp");
     append(chunk, std::string_view("\0\0\0\0\0", 5));
     append(chunk, photo_sphere_xmp(image.width, image.height));
-    Bytes whole;
+    PanoramaBytes whole;
     append_u32(whole, static_cast<std::uint32_t>(chunk.size() - 4));
     whole.insert(whole.end(), chunk.begin(), chunk.end());
     append_u32(whole,
@@ -134,7 +134,7 @@ void mark_panorama_video(const std::filesystem::path& path) {
     const auto refuse = [&](const char* why) {
         throw Error(path.string(), why, "Make the video again with this machine's ffmpeg.");
     };
-    Bytes file = read_file(path);
+    PanoramaBytes file = read_file(path);
     const Box all{0, file.size()};
     const auto movie = find_box(file, all, "moov");
     if (!movie) refuse("is no MP4 with an index");
@@ -144,7 +144,7 @@ void mark_panorama_video(const std::filesystem::path& path) {
     for (Box rest = inside(*movie); (track = find_box(file, rest, "trak")); rest.begin = track->end)
         if (is_video(file, *track)) break;
     if (!track) refuse("has no video track");
-    Bytes box;
+    PanoramaBytes box;
     append_u32(box, static_cast<std::uint32_t>(8 + kSphericalId.size() + kSphericalVideo.size()));
     append(box, "uuid");
     for (const std::uint8_t byte : kSphericalId) box.push_back(static_cast<std::byte>(byte));
