@@ -259,7 +259,8 @@ TEST_F(TrainedCommand, what_a_data_set_notes_is_said) {
                          ply(), set.string(), (scratch() / "noted_out").string()));
     EXPECT_EQ(r.code, 0) << r.err;
     EXPECT_NE(r.err.find("note: Undistorted at load: 8 photos"), std::string::npos) << r.err;
-    EXPECT_NE(r.err.find("pixels of the depth PNGs lie beyond 0.065535 world units"),
+    EXPECT_NE(r.err.find("pixels of the depth PNGs lie beyond their last step at 0.065535 "
+                         "world units"),
               std::string::npos)
         << r.err;
 }
