@@ -5,7 +5,7 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 add_library(darb_library INTERFACE)
-target_link_libraries(darb_library INTERFACE darb_trainer darb_publish darb_check)
+target_link_libraries(darb_library INTERFACE darb_trainer darb_mesh darb_publish darb_check)
 set_target_properties(darb_library PROPERTIES EXPORT_NAME darb)
 add_library(darb::darb ALIAS darb_library)
 
@@ -15,7 +15,7 @@ set(headers ${CMAKE_INSTALL_INCLUDEDIR}/darb)
 target_include_directories(darb_options INTERFACE $<INSTALL_INTERFACE:${headers}>)
 install(TARGETS darb RUNTIME COMPONENT darb)
 install(TARGETS darb_library darb_options darb_shaders darb_core darb_ranks darb_kernels darb_scene darb_reference darb_data darb_stereo
-  darb_gpu darb_primitives darb_raster darb_plan darb_render darb_report darb_publish darb_check darb_trainer EXPORT darb ARCHIVE COMPONENT dev)
+  darb_gpu darb_primitives darb_raster darb_plan darb_render darb_report darb_mesh darb_publish darb_check darb_trainer EXPORT darb ARCHIVE COMPONENT dev)
 install(EXPORT darb NAMESPACE darb:: FILE darb-targets.cmake DESTINATION ${package} COMPONENT dev)
 install(DIRECTORY engine trainer DESTINATION ${headers} COMPONENT dev FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY shaders/shared DESTINATION ${headers}/shaders COMPONENT dev FILES_MATCHING PATTERN "*.h")
