@@ -257,7 +257,7 @@ std::vector<Camera> cameras_of(const std::vector<View>& views) {
 
 namespace {
 
-constexpr double kTolerance = 1e-3;  // files with four decimals pass
+constexpr double kPoseTolerance = 1e-3;  // files with four decimals pass
 constexpr const char* kFixPose = "Remove this photo from the file or calibrate it again.";
 
 bool finite(const glm::dmat3& matrix) {
@@ -280,7 +280,7 @@ glm::dmat3 rotation_from_quaternion(glm::dvec4 wxyz, const std::string& where) {
 bool remove_scale(glm::dmat3& matrix) {
     const double scale =
         (glm::length(matrix[0]) + glm::length(matrix[1]) + glm::length(matrix[2])) / 3;
-    if (!(scale > 0) || !(std::abs(scale - 1) > kTolerance)) return false;
+    if (!(scale > 0) || !(std::abs(scale - 1) > kPoseTolerance)) return false;
     matrix /= scale;
     return true;
 }
@@ -290,7 +290,7 @@ glm::dmat3 checked_rotation(const glm::dmat3& matrix, const std::string& where) 
     const glm::dmat3 product = glm::transpose(matrix) * matrix;
     for (int c = 0; c < 3; ++c)
         for (int r = 0; r < 3; ++r)
-            if (!(std::abs(product[c][r] - (c == r ? 1.0 : 0.0)) <= kTolerance))
+            if (!(std::abs(product[c][r] - (c == r ? 1.0 : 0.0)) <= kPoseTolerance))
                 throw Error(where, "the rotation part of the pose is not orthonormal", kFixPose);
     if (!(glm::determinant(matrix) > 0))
         throw Error(where, "the rotation part of the pose mirrors (determinant -1)", kFixPose);

@@ -34,8 +34,8 @@ inline std::uint8_t byte_of_logit(double logit) {
 
 /// The log scale as the passes clamp it.
 inline float drawn_log_scale(float log_scale) {
-    constexpr auto kMost = static_cast<float>(LOG_SCALE_LIMIT);
-    return std::clamp(log_scale, -kMost, kMost);
+    constexpr auto limit = static_cast<float>(LOG_SCALE_LIMIT);
+    return std::clamp(log_scale, -limit, limit);
 }
 
 /// The colour in [0, 1] of a dc coefficient.
