@@ -202,7 +202,7 @@ GUARDS = [
      "for (int i = 0; i < (row->one_focal ? 1 : 2); ++i)", "for (int i = 0; i < 0; ++i)",
      "lens_test", "Lens.bad_parameters_are_errors"),
     ("degenerate camera", "orthonormal_rotation", "engine/data/camera_list.cpp",
-     "<= kTolerance))", "<= 1e300))",
+     "<= kPoseTolerance))", "<= 1e300))",
      "transforms_test", "Transforms.bad_files_are_errors_that_name_the_frame"),
     ("degenerate camera", "photo_missing", "engine/data/colmap.cpp",
      "if (!fs::is_regular_file(view.photo) && missing++ == 0)", "if (false && missing++ == 0)",
