@@ -24,11 +24,8 @@ case "${1:-full}" in
     -h | --help) echo "$usage"; exit 0 ;;
     *) steps=$* ;;
 esac
-
-logs=$(mktemp -d)
-trap 'rm -rf "$logs"' EXIT
+logs=$(mktemp -d) && trap 'rm -rf "$logs"' EXIT
 passed=0 failed=0 skipped=0 failures=()
-
 build() { # PRESET [TARGET...]: goes on after an error, so that all errors are shown
     cmake --preset "$1" >"$logs/configure" 2>&1 || { cat "$logs/configure"; return 1; }
     cmake --build --preset "$1" -j "$(nproc)" ${2:+--target "${@:2}"} -- -k 0
@@ -45,14 +42,10 @@ run_tests() { # BUILD LABEL [OPTION...]: tests start one thread per core themsel
 }
 logged() { "$@" 2>&1 | tee "$logs/$step"; }
 sanitized() { ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 run_tests build-asan sanitized --timeout 300 "$@"; }
-fetch_drivers() { # what drivers.gpu_compilers_slow compiles with; that test skips where they cannot be fetched
-    [[ -e build/gpu_compilers/bookworm-backports-radeon.json ]] ||
-        timeout 120 tools/lab/gpu_compilers.py fetch build/gpu_compilers || echo "setup: no driver of AMD to compile with"
-}
 readers='core|kernels|scene|data|mesh|trainer' # libraries that read files, and those below them
 run_step() {
     case $1 in
-        setup) logged tools/setup.sh && fetch_drivers ;;
+        setup) logged tools/setup.sh ;;
         style) logged tools/check_style.sh ;;
         release) logged build release ;;
         unit | gpu | long) run_tests build "$1" ;;

@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # tools/lab/gpu_compilers.py: AMD's compiler takes every pass within the tracked table, and a worse pass is found.
-# Skips (77) where Mesa's drivers are not unpacked (tools/lab/gpu_compilers.py fetch) or darb is not built.
+# Unpacks Mesa's drivers first, where they are missing; skips (77) where they cannot be had.
 #   gpu_compilers.sh BUILD
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 build=$1 dir=${DARB_GPU_COMPILERS:-$1/gpu_compilers}
-if [[ ! -e $dir/bookworm-backports-radeon.json ]]; then
+known=$dir/bookworm-backports-radeon.json
+[[ -e $known ]] || timeout 120 tools/lab/gpu_compilers.py fetch "$dir" || true
+if [[ ! -e $known ]]; then
     echo "skipped: no AMD driver below $dir; get it with: tools/lab/gpu_compilers.py fetch $dir"
     exit 77
 fi
