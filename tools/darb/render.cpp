@@ -201,6 +201,22 @@ void scale_camera(Camera& camera, int resolution) {
     camera = resized(camera, width, height);
 }
 
+std::vector<View> views_to_draw(const RenderFlags& flags) {
+    std::vector<View> views = open_cameras(flags.cameras, flags.data);
+    const bool is_list = !views.empty() && views[0].photo.empty();
+    if (is_list)
+        for (View& view : views) scale_camera(view.camera, flags.data.resolution);
+    return views;
+}
+
+std::vector<std::filesystem::path> files_of_views(const std::vector<View>& views,
+                                                  const std::filesystem::path& folder) {
+    std::vector<std::filesystem::path> files;
+    std::set<std::string> used;
+    for (const View& view : views) files.push_back(folder / picture_name(view.name, used));
+    return files;
+}
+
 int render(RenderFlags flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     const EffectChoice choice = choose_effects(flags.effects, EffectUse::pictures, flags.data);
@@ -210,13 +226,8 @@ int render(RenderFlags flags) {
     if (flags.cameras.empty()) return render_film(flags, accuracy, choice);
     SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, nullptr, flags.units));
     note_unused_choices(flags.accuracy, model.kernel);
-    std::vector<View> views = open_cameras(flags.cameras, flags.data);
-    const bool is_list = !views.empty() && views[0].photo.empty();
-    if (is_list)
-        for (View& view : views) scale_camera(view.camera, flags.data.resolution);
-    std::vector<std::filesystem::path> files;
-    std::set<std::string> used;
-    for (const View& view : views) files.push_back(flags.output / picture_name(view.name, used));
+    std::vector<View> views = views_to_draw(flags);
+    const std::vector<std::filesystem::path> files = files_of_views(views, flags.output);
     Paths outputs = files_around(flags, files);
     add_depth_files(flags.depth, files, outputs);
     refuse_to_overwrite_inputs(
