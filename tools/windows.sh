@@ -50,7 +50,7 @@ source_of() { find "$libraries/source" -mindepth 1 -maxdepth 1 -type d -name "$1
 
 # library NAME OPTIONS...: a source package's static library. FOLDER: where its CMakeLists.txt is, in the package.
 library() {
-    local name=$1 work=$libraries/work/$1
+    local name=$1 work=$libraries/made/$1
     shift
     logged "$name" cmake -S "$(source_of "$name")/${folder:-.}" -B "$work" -G Ninja -DCMAKE_BUILD_TYPE=Release \
         -DCMAKE_TOOLCHAIN_FILE="$PWD/cmake/mingw.cmake" -DDARB_WINDOWS_PREFIX="$libraries" -DBUILD_SHARED_LIBS=OFF \
@@ -62,20 +62,20 @@ library() {
 make_imgui() {
     local from part
     from=$(source_of imgui)
-    mkdir -p "$libraries/work/imgui" "$libraries/include/imgui/backends"
+    mkdir -p "$libraries/made/imgui" "$libraries/include/imgui/backends"
     cp "$from"/*.h "$libraries/include/imgui/"
     cp "$from"/backends/imgui_impl_{glfw,vulkan}.h "$libraries/include/imgui/backends/"
     for part in imgui imgui_draw imgui_tables imgui_widgets backends/imgui_impl_glfw backends/imgui_impl_vulkan; do
         logged imgui $triple-g++-posix -O2 -DNDEBUG -D_WIN32_WINNT=0x0A00 -I"$from" -I"$libraries/include" -c "$from/$part.cpp" \
-            -o "$libraries/work/imgui/${part##*/}.o"
+            -o "$libraries/made/imgui/${part##*/}.o"
     done
-    logged imgui $triple-ar rcs "$libraries/lib/libimgui.a" "$libraries"/work/imgui/*.o
+    logged imgui $triple-ar rcs "$libraries/lib/libimgui.a" "$libraries"/made/imgui/*.o
 }
 
 # The import library of Vulkan's loader, which comes with the driver of the graphics card. The functions are looked up
 # when the first of them is called, so that what needs no device runs where there is no driver.
 make_vulkan() {
-    local definition=$libraries/work/vulkan-1.def
+    local definition=$libraries/made/vulkan-1.def
     { echo "LIBRARY vulkan-1.dll"; echo EXPORTS
       sed -n 's/^VKAPI_ATTR .* VKAPI_CALL \(vk[A-Za-z0-9]*\)(.*/\1/p' /usr/include/vulkan/vulkan_core.h |
           grep -v '\(KHR\|EXT\|[A-Z][A-Z]\)$'
