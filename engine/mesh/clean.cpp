@@ -121,6 +121,16 @@ std::size_t remove_faces_without_area(TriangleMesh& mesh) {
 
 // 2. Parts.
 
+/// The vertices that faces join; a part is called by the vertex that find() gives.
+UnionFind parts_of(const TriangleMesh& mesh) {
+    UnionFind joined(mesh.vertex_count());
+    for (const Corners& face : mesh.face) {
+        joined.join(face[0], face[1]);
+        joined.join(face[0], face[2]);
+    }
+    return joined;
+}
+
 void remove_parts(TriangleMesh& mesh, const CleanOptions& options, CleanReport& report) {
     struct Part {
         std::size_t faces = 0, number = 0;
@@ -129,11 +139,7 @@ void remove_parts(TriangleMesh& mesh, const CleanOptions& options, CleanReport& 
         glm::vec3 high{-std::numeric_limits<float>::infinity()};
         bool kept = true;
     };
-    UnionFind joined(mesh.vertex_count());
-    for (const Corners& face : mesh.face) {
-        joined.join(face[0], face[1]);
-        joined.join(face[0], face[2]);
-    }
+    UnionFind joined = parts_of(mesh);
     std::map<std::uint32_t, Part> parts;
     for (std::size_t f = 0; f < mesh.face_count(); ++f) {
         Part& part = parts[joined.find(mesh.face[f][0])];
@@ -326,11 +332,7 @@ void remove_flat_parts(TriangleMesh& mesh) {
         bool closed = true;
     };
     const std::vector<std::uint32_t> twin = pair_half_edges(mesh).twin;
-    UnionFind joined(mesh.vertex_count());
-    for (const Corners& face : mesh.face) {
-        joined.join(face[0], face[1]);
-        joined.join(face[0], face[2]);
-    }
+    UnionFind joined = parts_of(mesh);
     std::map<std::uint32_t, Part> parts;
     for (std::size_t f = 0; f < mesh.face_count(); ++f) {
         const std::uint32_t name = joined.find(mesh.face[f][0]);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <nanoflann.hpp>
 #include <optional>
 #include <utility>
 
@@ -19,6 +18,7 @@
 #include "engine/core/text.h"
 #include "engine/mesh/surface_search.h"
 #include "engine/mesh/topology.h"
+#include "engine/scene/point_tree.h"
 
 namespace darb {
 
@@ -63,18 +63,6 @@ class SurfaceTarget : public Target {
     SurfaceSearch search_;
 };
 
-struct PointsView {
-    const std::vector<glm::dvec3>& points;
-    std::size_t kdtree_get_point_count() const { return points.size(); }
-    double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-        return points[i][static_cast<int>(axis)];
-    }
-    template <class Box>
-    bool kdtree_get_bbox(Box&) const {
-        return false;
-    }
-};
-
 class PointsTarget : public Target {
   public:
     /// normals: of the points, or empty.
@@ -98,9 +86,7 @@ class PointsTarget : public Target {
   private:
     const std::vector<glm::vec3>& normals_;
     PointsView view_;
-    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointsView>,
-                                        PointsView, 3>
-        tree_;
+    PointTree tree_;
 };
 
 class ShapesTarget : public Target {

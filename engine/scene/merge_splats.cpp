@@ -14,7 +14,6 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include <limits>
-#include <nanoflann.hpp>
 #include <numbers>
 #include <numeric>
 #include <thread>
@@ -25,6 +24,7 @@
 #include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/point_tree.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/sh_basis.h"
 #include "engine/scene/splat_model.h"
@@ -58,20 +58,6 @@ std::vector<glm::dvec3> apart(const std::vector<SplatMoments>& moments) {
     }
     return points;
 }
-
-struct PointsView {
-    const std::vector<glm::dvec3>& points;
-    std::size_t kdtree_get_point_count() const { return points.size(); }
-    double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-        return points[i][static_cast<int>(axis)];
-    }
-    template <class Box>
-    bool kdtree_get_bbox(Box&) const {
-        return false;
-    }
-};
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointsView>,
-                                                 PointsView, 3>;
 
 struct Candidate {
     double error;
@@ -212,7 +198,7 @@ std::vector<std::uint32_t> Merging::find_neighbours() {
     }
     const std::vector<glm::dvec3> points = apart(moments_);
     const PointsView view{points};
-    Tree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+    PointTree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(16));
     tree.buildIndex();
     std::vector<std::uint32_t> neighbours(kNearest * model_.size(), kNone);
     for_all(0, 0.5, [&](std::size_t i) {

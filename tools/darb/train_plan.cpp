@@ -169,7 +169,7 @@ void print_forecast(const Device& device, TrainJob& job, bool quiet) {
 }
 
 void print_growth(const Schedule& schedule) {
-    for (int i = 1; i < schedule.iterations; ++i)
+    for (int i = 1; i < schedule.options.iterations; ++i)
         if (schedule.refines_after(i)) return;
     if (schedule.rounds.end > 0)
         say("growth: none, because it would end after {} iterations and begin after {}; a longer "

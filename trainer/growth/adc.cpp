@@ -63,7 +63,7 @@ std::uint32_t end_by_photos(const Schedule& schedule, const GrowthStart& start) 
 
 // The count grows evenly while density control runs.
 double even_mean(const Schedule& schedule, std::uint32_t start, std::uint32_t end) {
-    const double all = schedule.iterations;
+    const double all = schedule.options.iterations;
     const Schedule::Rounds rounds = schedule.rounds;
     const double to = std::clamp<double>(rounds.end, 0, all);
     const double from = std::clamp<double>(rounds.begin, 0, to);

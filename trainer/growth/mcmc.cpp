@@ -48,7 +48,7 @@ class Mcmc : public DensityStrategy {
     void record_after_update(const StepFrame& f) override {
         const double rate = schedule_.options.noise_lr * schedule_.position_rate(f.iteration) *
                             kNoiseExtent * kNoiseExtent / extent_ *
-                            std::sqrt(static_cast<double>(schedule_.batch));
+                            std::sqrt(static_cast<double>(schedule_.options.batch));
         const auto stream = 0x6E6F697Eull << 32 | static_cast<std::uint32_t>(f.iteration);
         Pcg32 random(schedule_.options.seed, stream);
         relocation_.record_noise(f.commands, f.splats, f.status, static_cast<float>(rate),

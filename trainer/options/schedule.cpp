@@ -74,17 +74,11 @@ Schedule::Resets resets_of(const TrainOptions& o, float prune_opacity,
 
 }  // namespace
 
-Schedule::Schedule(const TrainOptions& o)
-    : options(o),
-      iterations(o.iterations),
-      last(o.iterations),
-      batch(o.batch),
-      strategy(o.strategy),
-      speedup(speedup_of(o)) {
-    if (batch < 1 || (batch & (batch - 1)) != 0)
-        throw Error(fmt::format("--batch {}", batch), "is no power of two",
+Schedule::Schedule(const TrainOptions& o) : options(o), last(o.iterations), speedup(speedup_of(o)) {
+    if (o.batch < 1 || (o.batch & (o.batch - 1)) != 0)
+        throw Error(fmt::format("--batch {}", o.batch), "is no power of two",
                     "Give 1, 2, 4, 8 and so on: gradients are added in pairs.");
-    const StrategyDefaults& defaults = strategy_row(strategy).defaults;
+    const StrategyDefaults& defaults = strategy_row(o.strategy).defaults;
     initial_opacity = o.initial_opacity.value_or(defaults.initial_opacity);
     initial_scale = o.initial_scale.value_or(defaults.initial_scale);
     prune_opacity = o.prune_opacity.value_or(defaults.prune_opacity);
@@ -99,7 +93,7 @@ Schedule::Schedule(const TrainOptions& o)
     rounds.interval = std::max(rounds.interval, 1);
     rounds.end = rounds_end(o);
     resets = resets_of(o, prune_opacity, rounds);
-    average_begin = std::max(static_cast<int>(o.average_from * iterations), rounds.end);
+    average_begin = std::max(static_cast<int>(o.average_from * options.iterations), rounds.end);
 
     // A kernel that covers less of the picture than a Gaussian has its lengths longer, learns its
     // scales faster, and gains from a limit of them; a Gaussian loses with one.
@@ -124,19 +118,19 @@ Schedule::Schedule(const TrainOptions& o)
 }
 
 int Schedule::step_end(int iteration) const {
-    const int end = iteration / batch * batch + batch;
+    const int end = iteration / options.batch * options.batch + options.batch;
     return iteration < last ? std::min(end, last) : end;
 }
 
 double Schedule::position_rate(int iteration) const {
     const double t =
-        std::clamp(double(iteration) / std::max(iterations, 1), 0.0, position_falls_for);
+        std::clamp(double(iteration) / std::max(options.iterations, 1), 0.0, position_falls_for);
     const auto from = static_cast<float>(first.position);
     return std::exp((1 - t) * std::log(from) + t * std::log(last_position_rate));
 }
 
 Schedule::Rates Schedule::rates(int iteration) const {
-    const double t = std::clamp(double(iteration) / std::max(iterations, 1), 0.0, 1.0);
+    const double t = std::clamp(double(iteration) / std::max(options.iterations, 1), 0.0, 1.0);
     const auto late = static_cast<float>(std::pow(last_share, std::max(0.0, 2 * t - 1)));
     Rates now = first;
     now.position = position_rate(iteration);
@@ -147,7 +141,7 @@ Schedule::Rates Schedule::rates(int iteration) const {
 }
 
 double Schedule::exposure_rate(int iteration) const {
-    const double t = std::clamp(double(iteration) / iterations, 0.0, 1.0);
+    const double t = std::clamp(double(iteration) / options.iterations, 0.0, 1.0);
     const float from = options.exposure_lr_init;
     return from * std::pow(options.exposure_lr_final / from, t);
 }
@@ -161,7 +155,7 @@ bool Schedule::refines_after(int iteration) const {
 }
 
 bool Schedule::resets_after(int iteration) const {
-    if (!strategy_row(strategy).follows_3dgs || iteration <= 0) return false;
+    if (!strategy_row(options.strategy).follows_3dgs || iteration <= 0) return false;
     return (resets.at_begin && iteration == rounds.begin) ||
            (iteration % resets.interval == 0 && iteration <= resets.last);
 }
@@ -172,12 +166,12 @@ bool Schedule::prunes_by_size(int iteration) const {
 
 bool Schedule::regularises_unseen(std::size_t photos, int iteration) const {
     const auto interval = static_cast<int>((photos + kPhotosThatBear - 1) / kPhotosThatBear);
-    return strategy_row(strategy).defaults.regularises_all ||
+    return strategy_row(options.strategy).defaults.regularises_all ||
            iteration % std::max(interval, 1) == 0;
 }
 
 bool Schedule::averages_after(int iteration) const {
-    const int interval = std::clamp(iterations / 160, 1, 10);
+    const int interval = std::clamp(options.iterations / 160, 1, 10);
     return iteration > average_begin && (last - iteration) % interval == 0;
 }
 
@@ -187,19 +181,21 @@ void Schedule::end_early(int iteration) {
         return;
     }
     if (iteration >= average_begin) return;
-    const double of_mean = double(iterations - average_begin) / std::max(average_begin, 1);
-    last = std::min(iterations, iteration + std::max(1, static_cast<int>(iteration * of_mean)));
+    const double of_mean = double(options.iterations - average_begin) / std::max(average_begin, 1);
+    last = std::min(options.iterations,
+                    iteration + std::max(1, static_cast<int>(iteration * of_mean)));
     average_begin = iteration;
 }
 
 bool Schedule::drops_undrawn_after(int iteration) const {
-    return strategy_row(strategy).drops_undrawn && rounds.end > rounds.begin &&
+    return strategy_row(options.strategy).drops_undrawn && rounds.end > rounds.begin &&
            iteration >= rounds.end && iteration <= average_begin && iteration < last &&
            iteration % (kRoundsADrop * rounds.interval) == 0;
 }
 
 int Schedule::last_change() const {
-    return strategy_row(strategy).drops_undrawn ? std::max(rounds.end, average_begin) : rounds.end;
+    return strategy_row(options.strategy).drops_undrawn ? std::max(rounds.end, average_begin)
+                                                        : rounds.end;
 }
 
 std::vector<RampStep> Schedule::ramp_steps(int longest_side) const {
@@ -207,7 +203,7 @@ std::vector<RampStep> Schedule::ramp_steps(int longest_side) const {
     if (!options.resolution_ramp) return steps;
     int before = 0;
     for (const RampSize& size : kRampSizes) {
-        const int until = static_cast<int>(size.until * iterations);
+        const int until = static_cast<int>(size.until * options.iterations);
         if (longest_side < kSmallestSide * size.divisor || until == before) continue;
         steps.push_back({size.divisor, until - before});
         before = until;

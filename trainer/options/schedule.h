@@ -76,15 +76,14 @@ class Schedule {
     int resolution_divisor(int iteration, int longest_side) const;
 
     /// A step ends with iterations in (step_begin(i), i], i being its last: one, or a batch.
-    int step_begin(int iteration) const { return std::max(0, (iteration - 1) / batch * batch); }
+    int step_begin(int iteration) const {
+        return std::max(0, (iteration - 1) / options.batch * options.batch);
+    }
     /// The last iteration of the step after this one: steps begin at multiples of the batch.
     int step_end(int iteration) const;
 
     TrainOptions options;  // as they were given
-    int iterations;
-    int last = 0;  // the run ends with it: `iterations`, or sooner after end_early()
-    int batch = 1;
-    Strategy strategy;
+    int last = 0;          // the run ends with it: options.iterations, or sooner after end_early()
     // Where they are not given, the strategy's.
     float initial_opacity = 0, initial_scale = 0, prune_opacity = 0;
     /// The opacity below which a splat is drawn by nobody: neither in training nor where pictures

@@ -144,7 +144,7 @@ void fit_size(const Device& device, const TrainOptions& options, std::uint32_t w
 // they save beyond that. Where most of the start goes they save the same share of what is left.
 void measure_ramp(Device& device, const Dataset& few, const SplatModel& start,
                   const Schedule& schedule, Forecast& f) {
-    int at_start = f.falls ? first_round(schedule) : schedule.iterations;
+    int at_start = f.falls ? first_round(schedule) : schedule.options.iterations;
     for (const RampStep& step : schedule.ramp_steps(std::max(f.demand.width, f.demand.height))) {
         Dataset smaller = few;
         for (View& view : smaller.views) view.camera = divided(view.camera, step.divisor);
@@ -177,7 +177,7 @@ SplatModel surface_model(const Dataset& dataset, TrainOptions options, const Spl
 double share_of_the_end(const Schedule& schedule, const Forecast& f) {
     if (f.falls) {
         const double before = first_round(schedule);
-        return 1 - std::clamp(before / schedule.iterations, 0.0, 1.0);
+        return 1 - std::clamp(before / schedule.options.iterations, 0.0, 1.0);
     }
     if (f.splats == f.start_splats) return 0;
     return (mean_splats(f.start_splats, f.splats, schedule) - f.start_splats) /
@@ -225,7 +225,7 @@ int ramp_end(const Schedule& schedule, const Forecast& f) {
 std::uint64_t splats_with_smaller_photos(const Schedule& schedule, const Forecast& f) {
     const double from = f.falls ? 0 : f.start_splats;
     const std::uint64_t grown =
-        strategy_row(schedule.strategy)
+        strategy_row(schedule.options.strategy)
             .forecast_until(schedule, ramp_end(schedule, f), from, f.splats);
     return std::max<std::uint64_t>(f.start_splats, grown);
 }

@@ -95,7 +95,7 @@ PaceForecast pace_from_json(const nlohmann::json& json) {
 }
 
 TimeLeft::TimeLeft(const Schedule& schedule, const PaceForecast& pace)
-    : iterations_(schedule.iterations), pace_(pace) {
+    : iterations_(schedule.options.iterations), pace_(pace) {
     const TrainOptions& options = schedule.options;
     has_target_ = strategy_row(options.strategy).grows_to_limit;
     if (options.probe_sh && schedule.degree_interval < iterations_) {

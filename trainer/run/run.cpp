@@ -80,7 +80,7 @@ class Run {
                                })),
           watch_(schedule),
           log_(run.output),
-          progress_(1, schedule.iterations, run.quiet) {
+          progress_(1, schedule.options.iterations, run.quiet) {
         for (std::size_t i = 0; i < photos_.size(); ++i)  // the others are where steps read them
             if (!dataset.views[i].is_test) photos_[i] = {};
         give_back_freed_memory();
@@ -174,7 +174,7 @@ void Run::resume() {
     const bool own = is_own(run_.resume_from, run_.output);
     if (!own) set_aside(run_.output);
     own ? log_.go_on(checkpoint.state.iteration) : log_.begin();
-    progress_ = Progress(checkpoint.state.iteration + 1, schedule_.iterations, run_.quiet);
+    progress_ = Progress(checkpoint.state.iteration + 1, schedule_.options.iterations, run_.quiet);
     progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
                                checkpoint.state.iteration));
     if (checkpoint.tuning != tuning_)
@@ -263,8 +263,9 @@ void Run::save_checkpoint(const std::filesystem::path& path) {
 
 // The stopwatch counts what the view draws, which shares the device, and no pause.
 void Run::show_step() {
-    const double paused_s = run_.on_step({trainer_.splats(), trainer_.iteration(),
-                                          schedule_.iterations, latest_, summary_.evaluations});
+    const double paused_s =
+        run_.on_step({trainer_.splats(), trainer_.iteration(), schedule_.options.iterations,
+                      latest_, summary_.evaluations});
     seconds_ -= paused_s;
     progress_.leave_out(paused_s);
 }
@@ -460,8 +461,8 @@ void Run::look_for_gain(int iteration) {
         summary_.ended_early = watch_.reason();
         log_.ends_early(iteration, trainer_.last_iteration(), summary_.ended_early);
         progress_.note(fmt::format("iteration {}: the run ends with iteration {} of {}: {}",
-                                   iteration, trainer_.last_iteration(), schedule_.iterations,
-                                   summary_.ended_early));
+                                   iteration, trainer_.last_iteration(),
+                                   schedule_.options.iterations, summary_.ended_early));
     }
     stopwatch(true);
 }
@@ -613,12 +614,12 @@ TrainResult follow_training(Device& device, const Dataset& dataset, const Schedu
         check_resumable(*checkpoint, run.resume_from, schedule, dataset, fingerprint);
         trainer.restore(checkpoint->state);
     }
-    while (trainer.iteration() < schedule.iterations &&
+    while (trainer.iteration() < schedule.options.iterations &&
            !is_to_stop(trainer, run.ranks, stop && stop->load()))
         while_doing(fmt::format("iteration {}", trainer.iteration() + 1), [&] { trainer.step(); });
     TrainResult summary;
     summary.iteration = trainer.iteration();
-    summary.interrupted = trainer.iteration() < schedule.iterations;
+    summary.interrupted = trainer.iteration() < schedule.options.iterations;
     return summary;
 }
 

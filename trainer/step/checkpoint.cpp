@@ -412,10 +412,10 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
     const Json before = settings_of(checkpoint, path.string());
     const Json now = Json::parse(settings_text(schedule));
     const std::string strategy = before.value("strategy", std::string(strategy_name(Strategy{})));
-    if (strategy != strategy_name(schedule.strategy))
+    if (strategy != strategy_name(schedule.options.strategy))
         throw Error(path.string(),
                     fmt::format("was written with --strategy {}, this is --strategy {}", strategy,
-                                strategy_name(schedule.strategy)),
+                                strategy_name(schedule.options.strategy)),
                     "Repeat the strategy of that run, or start without --resume.");
     if (const std::string differences = settings_differences(before, now); !differences.empty())
         throw Error(path.string(), "was written with other settings:" + differences,

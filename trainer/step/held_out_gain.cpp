@@ -34,7 +34,7 @@ void check_gain_watch(const Dataset& dataset, const TrainOptions& options, const
 GainWatch::GainWatch(const Schedule& schedule)
     : patience_(schedule.options.end_without_gain),
       begin_(schedule.rounds.end),
-      end_(schedule.averages() ? schedule.average_begin : schedule.iterations) {}
+      end_(schedule.averages() ? schedule.average_begin : schedule.options.iterations) {}
 
 bool GainWatch::is_due(int begin, int iteration) const {
     if (patience_ == 0 || state_.end > 0 || iteration < begin_ || iteration >= end_) return false;
@@ -103,7 +103,7 @@ DegreeProbe::DegreeProbe(const Schedule& schedule)
 
 bool DegreeProbe::is_due(int iteration, int degree) const {
     return on_ && schedule_.step_begin(iteration) < next_ && next_ <= iteration &&
-           iteration < schedule_.iterations && degree < highest_degree_;
+           iteration < schedule_.options.iterations && degree < highest_degree_;
 }
 
 void DegreeProbe::set_aside(const std::vector<int>& views) {

@@ -291,8 +291,9 @@ MemoryDemand MemoryBudget::growth_demand(const HeldMemory& held,
         most *= static_cast<std::uint64_t>(held.divisor);
     }
     if (schedule_.options.probe_sh)  // what is on trial is to have room, and what follows it
-        grown.sh_degree = grown.sh_degree == 0 ? std::min(1, schedule_.options.sh_degree)
-                                               : predict_degree(schedule_, schedule_.iterations);
+        grown.sh_degree = grown.sh_degree == 0
+                              ? std::min(1, schedule_.options.sh_degree)
+                              : predict_degree(schedule_, schedule_.options.iterations);
     grown.room_splats = 0;
     grown.intersections = std::max(4 * grown.splats, most + most / 2);
     grown.intersections += grown.intersections / 2;

@@ -44,7 +44,7 @@ AdamStep Optimizer::rates(int iteration) const {
 // views as those of single ones (Zhao et al., Grendel-GS, arXiv 2406.18533). Harmonics above the
 // first band that gather make their step when as many views are over, or at each of larger batches.
 AdamStep Optimizer::of_batch(AdamStep step) const {
-    const int views = schedule_.batch;
+    const int views = schedule_.options.batch;
     if (views == 1) return step;
     const double gathered = schedule_.rest_every;
     step.rest_every = std::max(schedule_.rest_every / views, 1);
@@ -74,7 +74,7 @@ AdamStep Optimizer::with_regularisers(AdamStep step, int iteration) const {
 }
 
 AdamStep Optimizer::step(int iteration) const {
-    const int steps = (iteration - 1) / schedule_.batch + 1;
+    const int steps = (iteration - 1) / schedule_.options.batch + 1;
     return with_regularisers(adam_step(of_batch(rates(iteration)), steps), iteration);
 }
 

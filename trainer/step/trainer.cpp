@@ -79,7 +79,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       order_(photos_.views(), schedule.options.seed),
       optimizer_(schedule, extent_, scene_reach(dataset), photos_.count()),
       density_(device, schedule.options.kernel, schedule.options.footprint),
-      strategy_(strategy_row(schedule.strategy).make({device, schedule_, extent_})),
+      strategy_(strategy_row(schedule.options.strategy).make({device, schedule_, extent_})),
       average_(device),
       probe_(schedule),
       step_(device, splats_, photos_, loss_options(schedule.options, dataset), schedule.options) {
@@ -130,7 +130,7 @@ StepInput Trainer::input_for(int iteration, int view, int last) const {
 // saved between them is what was trained, not what was just reset.
 void Trainer::step() {
     if (turns_.opened != iteration_) open_step();
-    if (ranks_.mixed && iteration_ / schedule_.batch % kStepsApart == 0) follow_first();
+    if (ranks_.mixed && iteration_ / schedule_.options.batch % kStepsApart == 0) follow_first();
     set_resolution(iteration_ + 1);
     const int begin = iteration_;
     tree_ ? run_batch() : run_step();

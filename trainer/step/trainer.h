@@ -117,7 +117,7 @@ class Trainer {
     /// The run is to end sooner, as Schedule::end_early() has it. Not part of state(): after
     /// restore(), call it again with the same iteration.
     void end_early(int iteration) { schedule_.end_early(iteration); }
-    int views_a_step() const { return schedule_.batch; }
+    int views_a_step() const { return schedule_.options.batch; }
     std::uint32_t splat_count() const { return splats_.count(); }
     /// On the device, for work on the same queue between steps; the object stays, its buffers are
     /// replaced by density control.

@@ -49,7 +49,7 @@ TEST(OpacityReset, the_last_one_by_the_length_of_the_run) {
 TEST(UndrawnSplats, go_between_the_end_of_growth_and_the_mean) {
     const auto drops = [](const Schedule& schedule) {
         std::vector<int> all;
-        for (int i = 0; i <= schedule.iterations; ++i)
+        for (int i = 0; i <= schedule.options.iterations; ++i)
             if (schedule.drops_undrawn_after(i)) all.push_back(i);
         return all;
     };

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// PointTree: nearest neighbours among points in double, by nanoflann.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <nanoflann.hpp>
+#include <vector>
+
+namespace darb {
+
+/// The points as nanoflann reads them. They must outlive it, and a tree over it.
+struct PointsView {
+    const std::vector<glm::dvec3>& points;
+    std::size_t kdtree_get_point_count() const { return points.size(); }
+    double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+        return points[i][static_cast<int>(axis)];
+    }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+        return false;
+    }
+};
+
+using PointTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointsView>,
+                                        PointsView, 3>;
+
+}  // namespace darb
