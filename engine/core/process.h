@@ -62,7 +62,8 @@ class ChildProcess {
   private:
     void close_output();
     static constexpr std::intptr_t kNone = -1;
-    std::intptr_t process_ = kNone, output_ = kNone, group_ = kNone;
+    std::intptr_t process_ = kNone, output_ = kNone;
+    [[maybe_unused]] std::intptr_t group_ = kNone;  // its job, on Windows
     ProcessEnd ended_;
 };
 

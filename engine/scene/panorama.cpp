@@ -166,7 +166,7 @@ ImageF join_faces(std::span<const ImageF, kCubeFaces> faces, int width, int heig
         for (std::size_t y = first; y < first + count; ++y)
             for (int x = 0; x < width; ++x)
                 for (int s = 0; s < 4; ++s)
-                    add({x + 0.25 + 0.5 * (s % 2), double(y) + 0.25 + 0.5 * (s / 2)},
+                    add({x + 0.25 + 0.5 * (s % 2), double(y) + 0.25 + 0.5 * double(s / 2)},
                         &out.data[(y * static_cast<std::size_t>(width) +
                                    static_cast<std::size_t>(x)) *
                                   values]);
