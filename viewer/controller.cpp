@@ -119,6 +119,10 @@ void Controller::act(int width, int height) {
             document_->need_scene("export");
             painter_->start_export();
         },
+        [&](request::FindFreeSpace find) {
+            document_->need_scene("search");
+            painter_->start_search(find.least_views);
+        },
         [&](request::CancelLoad) { document_->cancel_load(); },
         [&](request::CancelWork) { painter_->cancel_work(); },
         [&](request::Quit) { quit(); },

@@ -178,13 +178,6 @@ class CubeGrid {
 
 }  // namespace
 
-bool Region::contains(const glm::dvec3& p) const {
-    const glm::dvec3 d = p - centre;
-    if (shape == Shape::sphere) return glm::dot(d, d) <= half_size.x * half_size.x;
-    return std::abs(d.x) <= half_size.x && std::abs(d.y) <= half_size.y &&
-           std::abs(d.z) <= half_size.z;
-}
-
 SplatMask in_rectangle(const SplatModel& model, const Camera& camera, glm::dvec2 a, glm::dvec2 b) {
     const glm::dvec2 low = glm::min(a, b), high = glm::max(a, b);
     return on_screen(model, camera, [&](const glm::dvec2& p) {

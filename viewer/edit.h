@@ -21,15 +21,6 @@ namespace darb {
 /// [N], 1 for splats that are in the set.
 using SplatMask = std::vector<std::uint8_t>;
 
-/// A box along the world's axes, or a sphere.
-struct Region {
-    enum class Shape { box, sphere };
-    Shape shape = Shape::box;
-    glm::dvec3 centre{0.0};     // world
-    glm::dvec3 half_size{1.0};  // world; for a sphere x is the radius
-    bool contains(const glm::dvec3& p) const;
-};
-
 /// a and b are opposite corners, px.
 SplatMask in_rectangle(const SplatModel& model, const Camera& camera, glm::dvec2 a, glm::dvec2 b);
 /// The outline in px; its ends are joined, and the even-odd rule decides what is inside.

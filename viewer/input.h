@@ -90,7 +90,10 @@ struct LoadPath {};
 struct SavePath {};
 struct ExportPath {};
 struct CancelLoad {};
-struct CancelWork {};  // an export or a measurement
+struct FindFreeSpace {
+    int least_views = 3;
+};                     // selects the splats that so many photos look through
+struct CancelWork {};  // an export, a measurement or a search
 struct Quit {};
 // Answers to the question that session.leaving asks.
 struct SaveAndLeave {};
@@ -107,8 +110,9 @@ using Request =
                  request::LeavePhoto, request::FollowPlan, request::Measure, request::ShowOpen,
                  request::Open, request::ShowEdits, request::Save, request::SavePage,
                  request::LoadPath, request::SavePath, request::ExportPath, request::CancelLoad,
-                 request::CancelWork, request::Quit, request::SaveAndLeave, request::Leave,
-                 request::Stay, request::ToggleFullScreen, request::LeaveFullScreen>;
+                 request::FindFreeSpace, request::CancelWork, request::Quit, request::SaveAndLeave,
+                 request::Leave, request::Stay, request::ToggleFullScreen,
+                 request::LeaveFullScreen>;
 using RequestQueue = std::vector<Request>;
 
 template <class Kind>

@@ -490,6 +490,22 @@ void Painter::start_measure(int width, int height) {
                         session_->display, session_->own);
 }
 
+void Painter::start_search(int least_views) {
+    if (session_->photos.views.empty())
+        throw Error("free space", "is what the cameras of photos look through, and there are none",
+                    "Open it with its cameras: darb view SCENE --cameras DATASET.");
+    std::vector<Camera> cameras;
+    for (const View& view : session_->photos.views) cameras.push_back(view.camera);
+    FreeSpaceOptions options;
+    options.least_views = static_cast<std::uint32_t>(least_views);
+    work_.start_search(*device_, session_->scene->model, cameras, options);
+}
+
+void Painter::step_search() {
+    const std::optional<SplatSet> found = work_.step_search();
+    if (found) show_edit(session_->edit.select(*found, Combine::replace), *session_);
+}
+
 void Painter::step_export(bool wait) {
     const std::optional<std::string> summary = work_.step_export(picture_, wait);
     if (!summary) return;
@@ -507,8 +523,10 @@ void Painter::step_work() {
     if (work_.exports()) session_->attempt([&] { step_export(false); });
     if (work_.measures())
         session_->attempt([&] { session_->measured = work_.step_measure(picture_); });
+    if (work_.searches()) session_->attempt([&] { step_search(); });
     session_->progress.exporting = work_.export_share();
     session_->progress.measuring = work_.measure_share();
+    session_->progress.searching = work_.search_share();
 }
 
 }  // namespace darb

@@ -101,9 +101,10 @@ class Painter {
     /// What is seen, without panels and highlights. of_run: takes the picture of the run that is
     /// shown; null where there is none yet. Waits.
     std::optional<ImageU8> picture_alone(int width, int height, bool of_run);
-    /// Exports and measurements draw pictures of their own. Throws Error.
+    /// Exports, measurements and searches draw pictures of their own. Throws Error.
     void start_export();
     void start_measure(int width, int height);
+    void start_search(int least_views);
     void cancel_work() { work_.cancel(); }
     bool draws_work() const { return work_.draws(); }
     bool exports() const { return work_.exports(); }
@@ -147,6 +148,7 @@ class Painter {
     bool make_picture(const PaneWish& wish, Started& started, bool wait);
     void rehearse_motion(const PictureKey& key);
     void step_work();
+    void step_search();
     void start_levels();
     void take_levels();
     void lose_levels();

@@ -57,6 +57,24 @@ void AccuracyMeasure::step(
 
 namespace {
 
+constexpr std::size_t kMostAsked = 48;
+
+std::vector<Camera> some_of(const std::vector<Camera>& cameras) {
+    std::vector<Camera> some;
+    const std::size_t count = std::min(kMostAsked, cameras.size());
+    for (std::size_t i = 0; i < count; ++i) some.push_back(cameras[i * cameras.size() / count]);
+    return some;
+}
+
+}  // namespace
+
+FreeSpaceSearch::FreeSpaceSearch(Device& device, const SplatModel& model,
+                                 const std::vector<Camera>& cameras,
+                                 const FreeSpaceOptions& options)
+    : cameras_(some_of(cameras)), renderer_(device, model), space_(model, options) {}
+
+namespace {
+
 // The first timing may include compiling; the smaller of the two others counts.
 constexpr int kTimings = 3;
 
@@ -99,13 +117,21 @@ void PictureWork::start_measure(const Camera& camera, const DisplaySettings& dis
     measure_.emplace(camera, display, own);
 }
 
+void PictureWork::start_search(Device& device, const SplatModel& model,
+                               const std::vector<Camera>& cameras,
+                               const FreeSpaceOptions& options) {
+    search_ = std::make_unique<FreeSpaceSearch>(device, model, cameras, options);
+}
+
 void PictureWork::cancel() {
     export_.reset();
     measure_.reset();
+    search_.reset();
 }
 
 std::string PictureWork::lose_scene(const char* why) {
     measure_.reset();
+    search_.reset();
     if (!export_ || export_->has_frames()) return "";
     const std::string note = fmt::format("the export ended after {} of {} frames: {}",
                                          export_->written(), export_->frame_count(), why);
@@ -143,6 +169,17 @@ std::vector<MeasuredChoice> PictureWork::step_measure(SplatPicture& picture) {
     std::vector<MeasuredChoice> results = measure_->results();
     if (measure_->done()) measure_.reset();
     return results;
+}
+
+std::optional<SplatSet> PictureWork::step_search() {
+    try {
+        search_->step();
+    } catch (...) {
+        search_.reset();
+        throw;
+    }
+    if (!search_->done()) return {};
+    return std::exchange(search_, nullptr)->splats();
 }
 
 namespace {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // PictureWork: work that draws pictures of its own while the window lives, one picture a frame. It
-// is the export of a camera path, or the measurement of settings and effects. Both may run at a
-// time.
+// is the export of a camera path, the measurement of settings and effects, or the search for splats
+// in free space. They may run at a time.
 #pragma once
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -16,7 +17,10 @@
 #include "engine/core/image.h"
 #include "engine/gpu/device.h"
 #include "engine/gpu/pipeline.h"
+#include "engine/render/free_space.h"
+#include "engine/render/renderer.h"
 #include "engine/scene/camera.h"
+#include "engine/scene/clutter.h"
 #include "engine/scene/splat_model.h"
 #include "viewer/display.h"
 #include "viewer/path_export.h"
@@ -55,24 +59,45 @@ class AccuracyMeasure {
     ImageF exact_;
 };
 
+class FreeSpaceSearch {
+  public:
+    FreeSpaceSearch(Device& device, const SplatModel& model, const std::vector<Camera>& cameras,
+                    const FreeSpaceOptions& options);
+    bool done() const { return next_ >= cameras_.size(); }
+    double share() const { return double(next_) / double(cameras_.size()); }
+    void step() { space_.ask(renderer_, cameras_[next_++]); }
+    SplatSet splats() const { return space_.splats(); }
+
+  private:
+    std::vector<Camera> cameras_;
+    Renderer renderer_;
+    FreeSpace space_;
+    std::size_t next_ = 0;
+};
+
 class PictureWork {
   public:
     /// Ends an earlier export. Throws as PathExport does.
     void start_export(const CameraPath& path, const ExportOptions& options);
     void start_measure(const Camera& camera, const DisplaySettings& display,
                        const DisplaySettings& own);
+    /// model: must stay as it is until the search ends. cameras: at most 48 of them are asked.
+    void start_search(Device& device, const SplatModel& model, const std::vector<Camera>& cameras,
+                      const FreeSpaceOptions& options);
     void cancel();
     /// Ends the work, because the scene that it shows is gone. Returns what there is to say, or "".
     std::string lose_scene(const char* why);
 
     bool exports() const { return export_.has_value(); }
     bool measures() const { return measure_.has_value(); }
-    /// Whether the next step draws into the picture.
-    bool draws() const { return measures() || (exports() && !export_->has_frames()); }
+    bool searches() const { return search_ != nullptr; }
+    /// Whether the next step draws into the picture, or takes the time that one would take.
+    bool draws() const { return measures() || searches() || (exports() && !export_->has_frames()); }
     double export_share() const {
         return export_ ? export_->share() : -1;
     }  // negative: there is none
     double measure_share() const { return measure_ ? measure_->share() : -1; }
+    double search_share() const { return search_ ? search_->share() : -1; }
 
     /// Draws one picture of the export. Once all are there, it looks whether the video is done, or
     /// waits for it with `wait`. Returns what was written where that ends the export. A failed
@@ -80,10 +105,13 @@ class PictureWork {
     std::optional<std::string> step_export(SplatPicture& picture, bool wait = false);
     /// Returns all that has been measured so far. A failed measurement is over. Throws Error.
     std::vector<MeasuredChoice> step_measure(SplatPicture& picture);
+    /// Asks one camera. Returns what was found once all were asked. Throws Error.
+    std::optional<SplatSet> step_search();
 
   private:
     std::optional<PathExport> export_;
     std::optional<AccuracyMeasure> measure_;
+    std::unique_ptr<FreeSpaceSearch> search_;
 };
 
 /// Converts B8G8R8A8 [height][width] to RGB.

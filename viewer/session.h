@@ -72,7 +72,7 @@ struct MeasuredChoice {
 
 /// Shares from 0 to 1; negative where no such work goes on.
 struct WorkProgress {
-    double load = -1, exporting = -1, measuring = -1;
+    double load = -1, exporting = -1, measuring = -1, searching = -1;
     std::string load_stage;
 };
 

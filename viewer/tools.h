@@ -3,6 +3,8 @@
 // gizmo moves, turns and scales the selection.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <glm/glm.hpp>
 #include <optional>
 #include <vector>
@@ -42,6 +44,16 @@ struct ControlFrame;
 enum class Tool { navigate, rectangle, lasso, brush, sphere, move, turn, scale };
 inline constexpr int kToolCount = 8;
 
+/// How often values occur, for the ranges that one drags.
+struct ValueHistograms {
+    static constexpr std::size_t kBins = 64;
+    int version = -1;                    // Edit::model_version that was counted
+    std::size_t splats = 0;              // of that model
+    std::array<float, kBins> opacity{};  // log(1 + count), from 0 to 1
+    std::array<float, kBins> size{};     // log(1 + count), from `least` to `most`, in logarithms
+    double least = 0, most = 0;          // largest standard deviations, world units
+};
+
 struct ToolState {
     Tool tool = Tool::navigate;
     float brush_px = 40;             // radius, px of the window
@@ -57,6 +69,11 @@ struct ToolState {
     int centre_version = -1;           // the edit's version for `centre`
     // The values of selections by value.
     float opacity[2] = {0, 0.1f}, scale[2] = {0, 0.1f};  // scale: world units
+    // Those of cleaning up: the least share of the heaviest part, the highest opacity of haze, its
+    // least size in times of the median, the least count of photos.
+    float isolated = 0.01f, haze_opacity = 0.1f, haze_size = 5;
+    int looked_through = 3;
+    ValueHistograms histograms;
     glm::vec3 colour{1.0f};
     float tolerance = 0.1f, grow = 0.01f;  // grow: world units
 };

@@ -22,7 +22,8 @@ namespace darb {
 /// (Brown-Conrady, fisheye, ...).
 struct LensModel {
     std::string model = "PINHOLE";   // COLMAP's name
-    std::vector<double> parameters;  // in COLMAP's order, px at full size
+    std::vector<double> parameters;  // in COLMAP's order, px at full size; empty: of a
+                                     // camera that took no photo
     int width = 0, height = 0;       // px at full size
     bool distorted() const;
     /// EQUIRECTANGULAR: the photo shows all directions, and a view of it is one face of a cube.

@@ -6,33 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <vector>
 
+#include "engine/core/union_find.h"
 #include "engine/mesh/triangle_mesh.h"
 
 namespace darb {
-
-/// Sets that grow together, named by their least element.
-class UnionFind {
-  public:
-    explicit UnionFind(std::size_t size) : parent_(size) {
-        std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
-    }
-    std::uint32_t find(std::uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
-    void join(std::uint32_t a, std::uint32_t b) {
-        a = find(a);
-        b = find(b);
-        if (a < b) parent_[b] = a;
-        if (b < a) parent_[a] = b;
-    }
-
-  private:
-    std::vector<std::uint32_t> parent_;
-};
 
 constexpr std::uint32_t kNoHalfEdge = std::numeric_limits<std::uint32_t>::max();
 

@@ -28,6 +28,7 @@ void add_train(CLI::App& app, Action& action, const std::vector<std::string>& ar
     DARB_VIEW_COMMAND(ROW)  \
     ROW(convert, "Scenes")  \
     ROW(mesh, "Scenes")     \
+    ROW(clean, "Scenes")    \
     ROW(info, "Insight")    \
     ROW(plan, "Insight")    \
     ROW(devices, "Insight") \

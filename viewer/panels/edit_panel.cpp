@@ -3,9 +3,12 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <vector>
 
+#include "engine/scene/clutter.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/panels/panels.h"
 
@@ -142,11 +145,57 @@ void undo_buttons(Session& s) {
     tip("Ctrl+Y");
 }
 
+void count_values(const SplatModel& model, int version, ValueHistograms& h) {
+    if (h.version == version && h.splats == model.size()) return;
+    h = {.version = version, .splats = model.size()};
+    const std::vector<double> sizes = largest_deviations(model);
+    const auto [least, most] = std::ranges::minmax_element(sizes);
+    if (sizes.empty() || !(*least > 0) || !std::isfinite(*most)) return;
+    h.least = *least;
+    h.most = std::max(*most, *least * (1 + 1e-9));
+    constexpr double kBins = double(ValueHistograms::kBins);
+    const auto bin = [&](double share) {
+        return static_cast<std::size_t>(std::clamp(share * kBins, 0.0, kBins - 1));
+    };
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+        ++h.opacity[bin(sigmoid(double{model.opacity_logit[i]}))];
+        ++h.size[bin(std::log(sizes[i] / h.least) / std::log(h.most / h.least))];
+    }
+    for (float& count : h.opacity) count = std::log1p(count);
+    for (float& count : h.size) count = std::log1p(count);
+}
+
+/// The histogram, with what the range from `low` to `high` selects, shares of its width, lit up.
+void histogram(const char* id, const std::array<float, ValueHistograms::kBins>& counts, double low,
+               double high, float gui_scale) {
+    const ImVec2 size(ImGui::CalcItemWidth(), 36 * gui_scale), at = ImGui::GetCursorScreenPos();
+    ImGui::InvisibleButton(id, size);
+    ImDrawList* const list = ImGui::GetWindowDrawList();
+    list->AddRectFilled(at, ImVec2(at.x + size.x, at.y + size.y),
+                        ImGui::GetColorU32(ImGuiCol_FrameBg));
+    const float top = std::max(*std::ranges::max_element(counts), 1.0f);
+    constexpr float kBins = float(ValueHistograms::kBins);
+    for (std::size_t b = 0; b < counts.size(); ++b) {
+        const double middle = (double(b) + 0.5) / double(kBins);
+        const bool inside = middle >= low && middle <= high;
+        const float x = at.x + size.x * float(b) / kBins;
+        list->AddRectFilled(
+            ImVec2(x, at.y + size.y * (1 - counts[b] / top)),
+            ImVec2(x + size.x / kBins - 1, at.y + size.y),
+            ImGui::GetColorU32(inside ? ImGuiCol_PlotHistogramHovered : ImGuiCol_PlotHistogram,
+                               inside ? 1.0f : 0.5f));
+    }
+}
+
 void select_by_value(Session& s) {
     if (!ImGui::TreeNode("Select by value")) return;
     ToolState& t = s.tools;
     const SplatModel& m = s.scene->model;
     const float top = static_cast<float>(s.scene->bounds.radius);
+    count_values(m, s.edit.model_version(), t.histograms);
+    const ValueHistograms& h = t.histograms;
+    histogram("opacities", h.opacity, double{t.opacity[0]}, double{t.opacity[1]}, s.gui_scale);
+    tip("How many splats have which opacity, 0 to 1; higher bars stand for many more");
     ImGui::DragFloatRange2("##opacity", &t.opacity[0], &t.opacity[1], 0.005f, 0, 1, "%.3f", "%.3f",
                            kClamped);
     tip("Lowest and highest opacity, 0 to 1");
@@ -154,6 +203,14 @@ void select_by_value(Session& s) {
     if (ImGui::Button("opacity"))
         select(by_opacity(m, double{t.opacity[0]}, double{t.opacity[1]}), s);
     tip("Select the splats in this range; Shift adds, Ctrl takes away");
+    const auto place = [&](float size) {
+        return h.most > h.least && size > 0
+                   ? std::log(double{size} / h.least) / std::log(h.most / h.least)
+                   : 0.0;
+    };
+    histogram("sizes", h.size, place(t.scale[0]), place(t.scale[1]), s.gui_scale);
+    tip("How many splats have which size, the smallest of the scene on the left and the largest on "
+        "the right, in logarithms");
     ImGui::DragFloatRange2("##scale", &t.scale[0], &t.scale[1], top / 500, 0, 100 * top, "%.3g",
                            "%.3g", kClamped);
     tip("Smallest and largest size: the largest standard deviation, in units of the scene");
@@ -169,6 +226,42 @@ void select_by_value(Session& s) {
     ImGui::SameLine();
     if (ImGui::Button("colour")) select(by_colour(m, glm::dvec3(t.colour), double{t.tolerance}), s);
     tip("Select by the colour without harmonics; Shift adds, Ctrl takes away");
+    ImGui::TreePop();
+}
+
+/// Each button selects what may go, so that it is seen before it is deleted.
+void clean_up(Session& s) {
+    if (!ImGui::TreeNode("Clean up")) return;
+    ToolState& t = s.tools;
+    const SplatModel& m = s.scene->model;
+    const float width = 130 * s.gui_scale;
+    ImGui::TextDisabled("Each selects; look, then press Delete.");
+    ImGui::SetNextItemWidth(width);
+    ImGui::SliderFloat("##isolated", &t.isolated, 0.0001f, 0.5f, "below %.2g", kLogarithmic);
+    tip("Share of the heaviest part, by opacity times area");
+    ImGui::SameLine();
+    if (ImGui::Button("isolated parts")) select(isolated_splats(m, double{t.isolated}), s);
+    tip("Parts that touch nothing else and are light; Shift adds, Ctrl takes away");
+    ImGui::SetNextItemWidth(width / 2 - 2);
+    ImGui::SliderFloat("##faint", &t.haze_opacity, 0.01f, 0.5f, "%.2f", kClamped);
+    tip("Highest opacity of haze, 0 to 1");
+    ImGui::SameLine(0, 4);
+    ImGui::SetNextItemWidth(width / 2 - 2);
+    ImGui::SliderFloat("##large", &t.haze_size, 1, 50, "%.1f x", kLogarithmic);
+    tip("Least size of haze, in times of the median size");
+    ImGui::SameLine();
+    if (ImGui::Button("haze"))
+        select(hazy_splats(m, double{t.haze_opacity}, double{t.haze_size}), s);
+    tip("Splats that are large and faint; Shift adds, Ctrl takes away");
+    ImGui::SetNextItemWidth(width);
+    ImGui::SliderInt("##views", &t.looked_through, 1, 20, "%d photos", kClamped);
+    tip("How many photos must look through a splat");
+    ImGui::SameLine();
+    ImGui::BeginDisabled(s.photos.views.empty());
+    if (ImGui::Button("in free space")) s.ask(request::FindFreeSpace{t.looked_through});
+    ImGui::EndDisabled();
+    tip(s.photos.views.empty() ? "Needs the cameras of the photos"
+                               : "Splats before surfaces that photos look through");
     ImGui::TreePop();
 }
 
@@ -234,6 +327,7 @@ void edit_panel(Session& s) {
     tool_choice(s);
     selection_buttons(s);
     undo_buttons(s);
+    clean_up(s);
     select_by_value(s);
     select_by_region(s);
     if (ImGui::Button("Merge a scene ...")) s.ask(request::ShowOpen{true});

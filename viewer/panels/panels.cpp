@@ -4,8 +4,10 @@
 
 #include <imgui.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "viewer/gui.h"
 
@@ -20,19 +22,18 @@ constexpr double kLeastFree = 0.4;
 
 void progress_window(Session& s, float width, float height) {
     const WorkProgress& p = s.progress;
-    if (p.load < 0 && p.exporting < 0 && p.measuring < 0) return;
+    if (std::max({p.load, p.exporting, p.measuring, p.searching}) < 0) return;
     ImGui::SetNextWindowPos(ImVec2(width / 2, height - 20), 0, ImVec2(0.5f, 1));
     ImGui::Begin("progress", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
     const bool loads = p.load >= 0;
-    const bool exports = p.exporting >= 0;
-    ImGui::TextUnformatted(loads     ? p.load_stage.c_str()
-                           : exports ? "exporting frames"
-                                     : "measuring settings and effects");
-    ImGui::ProgressBar(static_cast<float>(loads     ? p.load
-                                          : exports ? p.exporting
-                                                    : p.measuring),
-                       ImVec2(kWidth * s.gui_scale, 0));
+    const auto [text, share] = loads              ? std::pair(p.load_stage.c_str(), p.load)
+                               : p.exporting >= 0 ? std::pair("exporting frames", p.exporting)
+                               : p.measuring >= 0
+                                   ? std::pair("measuring settings and effects", p.measuring)
+                                   : std::pair("looking for splats in free space", p.searching);
+    ImGui::TextUnformatted(text);
+    ImGui::ProgressBar(static_cast<float>(share), ImVec2(kWidth * s.gui_scale, 0));
     ImGui::SameLine();
     if (ImGui::Button("Cancel"))
         s.ask(loads ? Request(request::CancelLoad{}) : Request(request::CancelWork{}));

@@ -40,6 +40,12 @@ std::vector<LensModel> all_models() {
         make("EUCM", {300, 305, 321, 239, 0.62, 1.1})};
 }
 
+// Cameras around a scene have taken no photo, and plans ask every view.
+TEST(Lens, of_no_photo_is_straight) {
+    EXPECT_FALSE(LensModel().distorted());
+    EXPECT_FALSE(too_wide_to_undistort(LensModel()));
+}
+
 TEST(Lens, four_radial_terms_stand_in_the_numerator) {
     const LensModel model =
         make(std::string(kFourRadial), {500, 510, 321, 239, 0.1, 0.05, 0, 0, 0.02, 0.01});

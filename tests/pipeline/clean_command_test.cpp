@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// darb clean, as a user runs it: what each rule leaves out of a scene whose clutter is known.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "engine/core/files.h"
+#include "engine/core/rng.h"
+#include "engine/scene/ply.h"
+#include "engine/scene/splat_file.h"
+#include "tests/support/run_command.h"
+
+namespace darb::test {
+namespace {
+
+constexpr std::size_t kBall = 800, kFar = 12, kHaze = 5;
+
+void add_splat(const glm::dvec3& at, double size, float opacity_logit, SplatModel& m) {
+    for (int c = 0; c < 3; ++c) {
+        m.position.push_back(static_cast<float>(at[c]));
+        m.log_scale.push_back(static_cast<float>(std::log(size)));
+        m.sh_dc.push_back(0.5f);
+    }
+    for (const float w : {1.0f, 0.0f, 0.0f, 0.0f}) m.rotation.push_back(w);
+    m.opacity_logit.push_back(opacity_logit);
+}
+
+/// A ball of radius 1 at the origin, a small cluster at y = -4, and haze over the ball.
+std::string scene_file() {
+    SplatModel m;
+    Pcg32 rng(4);
+    for (std::size_t i = 0; i < kBall; ++i)
+        add_splat(glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal())), 0.08, 3, m);
+    for (std::size_t i = 0; i < kFar; ++i) add_splat({0.01 * double(i), -4, 0}, 0.03, 3, m);
+    for (std::size_t i = 0; i < kHaze; ++i) add_splat({0.3 * double(i) - 0.6, 0, -1}, 0.7, -3.5, m);
+    const fs::path path = scratch() / "cluttered.ply";
+    write_ply(path, m);
+    return path.string();
+}
+
+std::string cameras_file() {
+    nlohmann::json list = nlohmann::json::array();
+    for (int i = 0; i < 4; ++i)
+        list.push_back({{"id", i},
+                        {"img_name", fmt::format("view_{}", i)},
+                        {"width", 64},
+                        {"height", 64},
+                        {"position", {0.5 * i - 0.75, 0.0, -5.0}},
+                        {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                        {"fx", 64.0},
+                        {"fy", 64.0}});
+    const std::string file = scratch_file("before_it.json");
+    write_file_atomic(file, list.dump());
+    return file;
+}
+
+TEST(CleanCommand, Leaves_out_isolated_parts_where_no_rule_is_named) {
+    const Outcome o = darb(fmt::format("clean '{}' -o '{}' --json '{}'", scene_file(),
+                                       scratch_file("clean.ply"), scratch_file("clean.json")));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(load_splats(scratch_file("clean.ply")).size(), kBall + kHaze);
+    const nlohmann::json report = read_json(scratch_file("clean.json"));
+    EXPECT_EQ(report["together"]["splats"], kFar);
+    EXPECT_GT(report["together"]["light_share"], 0.0);
+    EXPECT_LT(report["together"]["light_share"], 0.02);
+}
+
+TEST(CleanCommand, Shows_what_each_rule_would_take_and_writes_nothing) {
+    const std::string json = scratch_file("dry.json");
+    const Outcome o = darb(fmt::format(
+        "clean '{}' --dry-run --cameras '{}' --isolated 0.01 --haze 0.1,5 --free-space 3 "
+        "--few-views 2 --region sphere:0,0,0,1.5 --json '{}'",
+        scene_file(), cameras_file(), json));
+    ASSERT_EQ(o.code, 0) << o.err;
+    const nlohmann::json report = read_json(json);
+    std::map<std::string, std::size_t> taken;
+    for (const auto& rule : report["rules"]) taken[rule["rule"]] = rule["splats"];
+    EXPECT_EQ(taken["isolated parts"], kFar);
+    EXPECT_EQ(taken["outside the region"], kFar);
+    EXPECT_EQ(taken["haze"], kHaze);
+    EXPECT_EQ(taken["in free space"], 0u) << "haze touches the ball";
+    EXPECT_EQ(report["together"]["splats"], kFar + kHaze + taken["seen by few"]);
+    EXPECT_EQ(report["output"], "");
+}
+
+TEST(CleanCommand, Says_what_is_wrong) {
+    const std::string scene = scene_file();
+    const auto refused = [&](const std::string& more, const std::string& words) {
+        const Outcome o = darb("clean '" + scene + "' " + more);
+        EXPECT_EQ(o.code, 2) << more;
+        EXPECT_NE(o.err.find(words), std::string::npos) << more << "\n" << o.err;
+    };
+    const std::string to = "-o '" + scratch_file("never.ply") + "' ";
+    refused("", "names no output");
+    refused(to + "--dry-run", "Leave out one of them");
+    refused("-o '" + scratch_file("never.jpg") + "'", "names no format");
+    refused(to + "--free-space 3", "--cameras");
+    refused(to + "--few-views 3", "--cameras");
+    refused(to + "--region cube:1", "sphere:X,Y,Z,RADIUS");
+    refused(to + "--region box:1,1,1,0,2,2", "holds nothing");
+    refused(to + "--region sphere:0,0,0,-1", "holds nothing");
+    refused(to + "--region sphere:50,0,0,1", "nothing would be left");
+    refused(to + "--haze 0.1", "--haze");
+    refused("-o '" + scene + "'", scene);
+    EXPECT_FALSE(fs::exists(scratch_file("never.ply")));
+}
+
+}  // namespace
+}  // namespace darb::test

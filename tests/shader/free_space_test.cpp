@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+// Splats before a wall that cameras look through, against where they were put.
+#include "engine/render/free_space.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/core/rng.h"
+#include "tests/support/shared_device.h"
+
+namespace darb::test {
+namespace {
+
+void add_splat(const glm::dvec3& at, double size, float opacity_logit, SplatModel& m) {
+    for (int c = 0; c < 3; ++c) {
+        m.position.push_back(static_cast<float>(at[c]));
+        m.log_scale.push_back(static_cast<float>(std::log(size)));
+        m.sh_dc.push_back(0.5f);
+    }
+    for (const float w : {1.0f, 0.0f, 0.0f, 0.0f}) m.rotation.push_back(w);
+    m.opacity_logit.push_back(opacity_logit);
+}
+
+/// At x, 0, 0, looking along z.
+Camera camera_at(double x) {
+    Camera c;
+    c.width = 160;
+    c.height = 120;
+    c.fx = c.fy = 150;
+    c.cx = 80;
+    c.cy = 60;
+    c.translation = {-x, 0, 0};
+    return c;
+}
+
+struct Room {
+    SplatModel model;
+    std::size_t faint = 0, dense = 0, behind = 0;  // the first splats of each kind
+    std::vector<Camera> cameras;
+};
+
+/// An opaque wall at z = 5; faint splats halfway to it, an opaque ball there, and splats behind the
+/// wall.
+Room room() {
+    Room r;
+    Pcg32 rng(3);
+    for (int i = 0; i < 3000; ++i)
+        add_splat({8 * rng.uniform() - 4, 6 * rng.uniform() - 3, 5}, 0.12, 4, r.model);
+    r.faint = r.model.size();
+    for (int i = 0; i < 6; ++i) add_splat({0.3 * i - 0.75, 0.4, 2.5}, 0.05, -2.5, r.model);
+    r.dense = r.model.size();
+    for (int i = 0; i < 300; ++i) {
+        const glm::dvec3 way(rng.normal(), rng.normal(), rng.normal());
+        add_splat(glm::dvec3(0, -0.4, 2.5) + 0.15 * glm::normalize(way), 0.03, 4, r.model);
+    }
+    r.behind = r.model.size();
+    for (int i = 0; i < 5; ++i) add_splat({0.3 * i - 0.6, 0, 8}, 0.05, -2.5, r.model);
+    for (int v = 0; v < 5; ++v) r.cameras.push_back(camera_at(0.2 * v - 0.4));
+    return r;
+}
+
+SplatSet found(const Room& r, const FreeSpaceOptions& options = {}) {
+    Renderer renderer(shared_device(), r.model);
+    FreeSpace space(r.model, options);
+    for (const Camera& camera : r.cameras) space.ask(renderer, camera);
+    return space.splats();
+}
+
+TEST(FreeSpace, is_before_a_surface_and_faint) {
+    const Room r = room();
+    const SplatSet set = found(r);
+    for (std::size_t i = 0; i < r.model.size(); ++i)
+        EXPECT_EQ(set[i], i >= r.faint && i < r.dense ? 1 : 0) << i;
+    FreeSpaceOptions more;
+    more.least_views = 6;  // than there are cameras
+    EXPECT_EQ(count_of(found(r, more)), 0u);
+}
+
+// A single camera finds a surface where two faint splats take a quarter of its light together.
+TEST(FreeSpace, ends_where_enough_light_is_taken) {
+    Room r = room();
+    for (int i = 0; i < 6; ++i) add_splat({0.3 * i - 0.75, 0.4, 2.5}, 0.05, -1, r.model);
+    FreeSpaceOptions sparing;
+    sparing.taken = 0.2;
+    const SplatSet set = found(r, sparing);
+    for (std::size_t i = r.faint; i < r.dense; ++i) EXPECT_EQ(set[i], 0) << i;
+    EXPECT_EQ(count_of(found(r)), 12u);
+}
+
+TEST(FreeSpace, scales_wide_cameras_down) {
+    const Room r = room();
+    FreeSpaceOptions narrow;
+    narrow.width = 80;
+    const SplatSet set = found(r, narrow);
+    for (std::size_t i = r.faint; i < r.dense; ++i) EXPECT_EQ(set[i], 1) << i;
+}
+
+}  // namespace
+}  // namespace darb::test
