@@ -237,7 +237,7 @@ void clean_up(Session& s) {
     const float width = 130 * s.gui_scale;
     ImGui::TextDisabled("Each selects; look, then press Delete.");
     ImGui::SetNextItemWidth(width);
-    ImGui::SliderFloat("##isolated", &t.isolated, 0.0001f, 0.5f, "below %.2g", kLogarithmic);
+    ImGui::SliderFloat("##isolated", &t.isolated, 0.0001f, 0.5f, "below %.4f", kLogarithmic);
     tip("Share of the heaviest part, by opacity times area");
     ImGui::SameLine();
     if (ImGui::Button("isolated parts")) select(isolated_splats(m, double{t.isolated}), s);
