@@ -109,6 +109,19 @@ def metadata(version, python, licences):
     return "\n".join(lines)
 
 
+def copy_licences(copyrights, folder):
+    """darb's and those of COPYRIGHTS, with the texts that Debian's files only refer to; returns their names."""
+    shutil.copyfile(SOURCE / "LICENSE", folder / "LICENSE")
+    common = pathlib.Path("/usr/share/common-licenses")
+    for name in COPYRIGHTS:
+        places = [place / name / "copyright" for place in (copyrights, pathlib.Path("/usr/share/doc"))]
+        text = next(p for p in places if p.exists()).read_text(encoding="utf-8")
+        (folder / f"{name}.txt").write_text(text, encoding="utf-8")
+        for known in re.findall(rf"{common}/([A-Za-z0-9.+-]*[A-Za-z0-9+])", text):
+            shutil.copyfile(common / known, folder / f"{known}.txt")
+    return sorted(p.name for p in folder.iterdir())
+
+
 def stage(build, python, version, copyrights, root):
     """Lays the wheel's files out in root."""
     package = root / "darb"
@@ -125,11 +138,7 @@ def stage(build, python, version, copyrights, root):
     (scripts / "darb").write_text(COMMAND)
     info = root / f"darb-{version}.dist-info"
     (info / "licenses").mkdir(parents=True)
-    shutil.copyfile(SOURCE / "LICENSE", info / "licenses" / "LICENSE")
-    for name in COPYRIGHTS:
-        places = [folder / name / "copyright" for folder in (copyrights, pathlib.Path("/usr/share/doc"))]
-        shutil.copyfile(next(p for p in places if p.exists()), info / "licenses" / f"{name}.txt")
-    licences = sorted(p.name for p in (info / "licenses").iterdir())
+    licences = copy_licences(copyrights, info / "licenses")
     (info / "METADATA").write_text(metadata(version, python, licences), encoding="utf-8")
     (info / "WHEEL").write_text("Wheel-Version: 1.0\nGenerator: darb (tools/wheel.sh)\nRoot-Is-Purelib: false\n"
                                 f"Tag: cp{python}-cp{python}-{PLATFORM}\n")
