@@ -123,6 +123,12 @@ class Rasterization(unittest.TestCase):
         np.testing.assert_array_equal(got[0].numpy(), want[0])
         self.assertGreater(relative(got[1].numpy(), want[1]), 0.05)
 
+    def test_the_last_row_of_a_pose_is_not_read(self):
+        pictures, arrays = camera(), scene()
+        want = rasterization(**tensors({**arrays, **pictures}))[0]
+        pictures["viewmats"][:, 3] += np.float32([1e-9, 0, -1e-8, 1e-7])
+        np.testing.assert_array_equal(rasterization(**tensors({**arrays, **pictures}))[0].numpy(), want.numpy())
+
     def test_gradients_are_differences_of_the_picture_in_numpy(self):
         pictures, arrays = camera(), scene(channels=4)
         arrays["quats"] /= np.linalg.norm(arrays["quats"], axis=1, keepdims=True)

@@ -339,6 +339,8 @@ def rasterization(means, quats, scales, opacities, colors, viewmats, Ks, width, 
         t.cpu().contiguous() for t in (means, quats, scales, opacities, colors, viewmats, Ks))
     backgrounds = None if backgrounds is None else backgrounds.cpu().contiguous()
     antialiased = rasterize_mode == "antialiased"
+    # An inverse of torch's may leave rounding in the last row, which gsplat does not read.
+    viewmats = _torch.cat([viewmats[:, :3], viewmats.new_tensor([0, 0, 0, 1]).expand(len(viewmats), 1, 4)], 1)
 
     poses, pinholes = viewmats.to(means.dtype), Ks.to(means.dtype)
     points = _in_camera(means, poses)
