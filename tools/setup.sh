@@ -55,7 +55,7 @@ tests    clang-format-14      layout check; one version, so one answer
 tests    xvfb                 a display for the tests of the window
 tests    xdotool              mouse and keys in them
 tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effects that are off cost nothing
-tests    spirv-cross          shaders in Metal's language
+tests    spirv-cross          shaders in the language of Metal
 tests    python3              style script (standard library only)
 tests    universal-ctags      sizes of functions and classes, tools/lab/structure.py
 tests    assimp-utils         a second reader of the meshes that are written
