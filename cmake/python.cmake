@@ -3,6 +3,12 @@
 # found; DARB_WITH_PYTHON is the answer. It is found out before the libraries, because they are compiled differently for
 # the module.
 set(DARB_WITH_PYTHON OFF)
+# A wheel's Pythons need not be on this machine: their headers do.
+set(DARB_PYTHON_HEADERS "" CACHE STRING "Further Pythons to build the module for: folders pythonX.Y with their headers (tools/wheel.sh)")
+set(DARB_PYBIND11_HEADERS "" CACHE PATH "The folder above the headers of pybind11, for these")
+if(DARB_PYTHON_HEADERS)
+  set(DARB_WITH_PYTHON ON)
+endif()
 if(DARB_PYTHON)
   # Python must be that of the distribution, as its numpy is.
   if(NOT Python3_EXECUTABLE AND EXISTS /usr/bin/python3)

@@ -44,45 +44,17 @@ make_deb() {
 libraries=$PWD/$build/libraries # the prefix of what is built here
 system=/usr/lib/x86_64-linux-gnu
 
-# shellcheck source=tools/portable/debian_sources.sh
-. tools/portable/debian_sources.sh
-
-# library NAME OPTIONS...: builds a source package's static library, without what darb does not use.
-library() {
-    local name=$1 source
-    shift
-    source=$(find "$libraries/source" -mindepth 1 -maxdepth 1 -type d -name "$name-*")
-    if ! { cmake -S "$source" -B "$libraries/build/$name" -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_SHARED_LIBS=OFF \
-        -DCMAKE_POSITION_INDEPENDENT_CODE=ON -DCMAKE_INSTALL_PREFIX="$libraries" -DCMAKE_INSTALL_LIBDIR=lib "$@" &&
-        cmake --build "$libraries/build/$name" -j "$jobs" --target install; } >"$libraries/$name.log" 2>&1; then
-        tail -30 "$libraries/$name.log" >&2
-        exit 1
-    fi
-}
-
-make_libraries() {
-    [[ ! -e $libraries/done ]] || return 0
-    rm -rf "$libraries"
-    debian_sources "$libraries" fmtlib/bookworm libzip/bookworm muparser/bookworm meshoptimizer/bookworm glfw3/trixie # GLFW 3.4 looks for X11 when it is used
-    library fmtlib -DFMT_TEST=OFF -DFMT_DOC=OFF
-    library libzip -DENABLE_{COMMONCRYPTO,GNUTLS,MBEDTLS,OPENSSL,BZIP2,LZMA}=OFF -DBUILD_{TOOLS,REGRESS,EXAMPLES,DOC}=OFF
-    library muparser -DENABLE_{SAMPLES,OPENMP,WIDE_CHAR}=OFF
-    library meshoptimizer
-    library glfw3 -DGLFW_BUILD_{WAYLAND,EXAMPLES,TESTS,DOCS}=OFF
-    touch "$libraries/done"
-}
+# shellcheck source=tools/portable/static_libraries.sh
+. tools/portable/static_libraries.sh
 
 # newest_glibc FILE: prints the newest version of glibc that the file needs.
 newest_glibc() { objdump -T "$1" | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -1; }
 
 make_portable() {
-    make_libraries
-    configure -DDARB_PORTABLE=ON -DDARB_FMT_LIBRARY="$libraries/lib/libfmt.a" \
-        -DZIP_LIBRARY="$libraries/lib/libzip.a" -DMUPARSER_LIBRARY="$libraries/lib/libmuparser.a" \
-        -DMESHOPTIMIZER_LIBRARY="$libraries/lib/libmeshoptimizer.a" \
-        -DDARB_GLFW_LIBRARY="$libraries/lib/libglfw3.a" -DZSTD_LIBRARY=$system/libzstd.a -DWEBP_LIBRARY=$system/libwebp.a \
-        -DSTB_LIBRARY=$system/libstb.a -DZLIB_LIBRARY=$system/libz.a -DPNG_LIBRARY=$system/libpng16.a \
-        -DJPEG_LIBRARY=$system/libjpeg.a
+    local options
+    static_libraries "$libraries" options
+    configure -DDARB_PORTABLE=ON "${options[@]}" -DZSTD_LIBRARY=$system/libzstd.a -DWEBP_LIBRARY=$system/libwebp.a \
+        -DZLIB_LIBRARY=$system/libz.a -DPNG_LIBRARY=$system/libpng16.a -DJPEG_LIBRARY=$system/libjpeg.a
     cmake --build "$build" -j "$jobs" --target darb darb_pages
     local version name stage documents
     version=$(sed -n 's/^CMAKE_PROJECT_VERSION:STATIC=//p' "$build/CMakeCache.txt")

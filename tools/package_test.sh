@@ -1,13 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Installs the packages of darb in bare systems and trains 50 iterations there; needs root and debootstrap.
-#   tools/package_test.sh PACKAGES [deb | dev | portable | new | old]...    PACKAGES: what tools/package.sh wrote; default: all
+#   tools/package_test.sh PACKAGES [KIND]...    PACKAGES: what tools/package.sh wrote; default: its kinds, which are
 #     deb       darb_*.deb by apt in a bare Debian 12
 #     dev       libdarb-dev_*.deb there, with the program of docs/library.md
 #     portable  the archive in a bare Debian 12
 #     new       the archive in a bare Debian 13
 #     old       the archive in a bare Debian 11, glibc 2.31: it starts, computes and says that there is no device. It does not
 #               train there, as Debian 11's Mesa has no Vulkan 1.3
+# and of what tools/wheel.sh wrote, with Debian's own Python, first without PyTorch and then with it:
+#     wheel     the wheel for 3.11 by pip in a bare Debian 12
+#     wheel_new the wheel for 3.13 by pip in a bare Debian 13
 set -euo pipefail
 case ${1:-} in -h | --help | "") sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 packages=$(cd "$1" && pwd)
@@ -40,6 +43,7 @@ bare() {
     cp "$packages"/* "$root/packages/"
     cp -r "$source/assets/scene/." "$root/scene/"
     cp "$source/docs/library.md" "$root/"
+    echo force-unsafe-io >"$root/etc/dpkg/dpkg.cfg.d/quick" # the system is thrown away
     mount -t proc proc "$root/proc"
     mount --bind /dev "$root/dev"
 }
@@ -94,6 +98,32 @@ test_new() {
     bare trixie new
     inside new "$unpack; apt-get install -y -q --no-install-recommends mesa-vulkan-drivers >/tmp/apt; ldd --version | sed -n 1p; $try_it"
 }
+
+# try_wheel SUITE: the command, a picture and some iterations, without compilers; then darb.torch and darb.gsplat.
+try_wheel() {
+    bare "$1" "wheel_$1"
+    local root=$work/wheel_$1
+    mkdir -p "$root/darb/"{tests,tools/python,assets}
+    cp -r "$source/tests/python" "$root/darb/tests/"
+    cp -r "$source/tools/python/examples" "$root/darb/tools/python/"
+    ln -s /scene "$root/darb/assets/scene"
+    inside "wheel_$1" "apt-get update -q >/dev/null
+apt-get install -y -q --no-install-recommends python3-venv python3-numpy mesa-vulkan-drivers >/tmp/apt
+! command -v cc >/dev/null
+python3 -m venv --system-site-packages /venv; /venv/bin/pip install -q --no-index --find-links /packages darb
+cd /; /venv/bin/pip show -f darb | sed -n '1,/^License/p'; darb=/venv/bin/darb; $try_it
+test=/darb/tests/python; export DARB_COMMAND=/venv/bin/darb
+/venv/bin/python -B \$test/module_test.py
+code=0; /venv/bin/python -B \$test/gsplat_test.py || code=\$?; test \$code = 77
+apt-get install -y -q --no-install-recommends python3-torch >/tmp/apt
+for name in torch gsplat; do /venv/bin/python -B \$test/\${name}_test.py; done
+/venv/bin/python -B /darb/tools/python/examples/fit_gsplat.py -o /out --steps 30 --size 64
+/venv/bin/pip uninstall -q -y darb; ! test -e /venv/bin/darb"
+}
+
+test_wheel() { try_wheel bookworm; }
+
+test_wheel_new() { try_wheel trixie; }
 
 for kind in $kinds; do
     echo "== $kind"

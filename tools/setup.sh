@@ -55,6 +55,7 @@ tests    clang-format-14      layout check; one version, so one answer
 tests    xvfb                 a display for the tests of the window
 tests    xdotool              mouse and keys in them
 tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effects that are off cost nothing
+tests    spirv-cross          shaders in the language of Metal
 tests    python3              style script (standard library only)
 tests    universal-ctags      sizes of functions and classes, tools/lab/structure.py
 tests    assimp-utils         a second reader of the meshes that are written
@@ -72,6 +73,7 @@ packaging dpkg-dev           tools/package.sh: libraries of packages, sources of
 packaging fakeroot           tools/package.sh: owners of files
 packaging python3            tools/package.sh: man pages and completion
 packaging xz-utils           tools/package.sh: the archive
+packaging patchelf           tools/wheel.sh: names of libraries
 packaging libxrandr-dev      tools/package.sh: GLFW 3.4
 packaging libxinerama-dev    tools/package.sh: GLFW 3.4
 packaging libxcursor-dev     tools/package.sh: GLFW 3.4

@@ -17,7 +17,8 @@ usage='usage: tools/test.sh [full | quick | STEP...]
   pipelines  the same for commands and device     includes  build with clang, without precompiled headers
   long       device tests that take minutes       python    all of tests/python, with PyTorch
   tidy       clang-tidy on every file             lab       the checks of tools/lab, and its programs
-  windows    builds darb for Windows on Debian 12, and tries it under Wine'
+  windows    builds darb for Windows on Debian 12, and tries it under Wine
+  libcxx     after release: whether all compiles with clang and libc++, as on macOS'
 case "${1:-full}" in
     full) steps=$standard ;;
     quick) steps="setup style release unit" ;;
@@ -58,6 +59,7 @@ run_step() {
         python) logged tools/setup.sh --with-python --with-torch && logged build python && run_tests build-python python ;;
         tidy) logged tools/check_style.sh --tidy ;;
         windows) logged tools/setup.sh --with-windows && logged tools/windows.sh build test package ;;
+        libcxx) logged tools/lab/libcxx.py build ;;
         lab) logged build lab && logged tools/lab/check.sh ;;
         *) echo "$usage" >&2; exit 2 ;;
     esac

@@ -199,16 +199,14 @@ WarmUp::WarmUp(Device& window, DeviceOptions options, const SplatModel& model,
                std::vector<DisplaySettings> displays, const Camera& camera,
                std::function<void()> wake)
     : thread_([this, &window, options = std::move(options), few = few_of(model),
-               displays = std::move(displays), camera,
-               wake = std::move(wake)](const std::stop_token& stop) {
-          run(stop, window, options, few, displays, camera);
+               displays = std::move(displays), camera, wake = std::move(wake)] {
+          run(window, options, few, displays, camera);
           done_ = true;
           if (wake) wake();
       }) {}
 
-void WarmUp::run(const std::stop_token& stop, Device& window, const DeviceOptions& options,
-                 const SplatModel& few, const std::vector<DisplaySettings>& displays,
-                 const Camera& camera) {
+void WarmUp::run(Device& window, const DeviceOptions& options, const SplatModel& few,
+                 const std::vector<DisplaySettings>& displays, const Camera& camera) {
     try {
         Device device(options);
         device.set_tuning(window.tuning());
@@ -218,12 +216,12 @@ void WarmUp::run(const std::stop_token& stop, Device& window, const DeviceOption
         picture.set_scene(few, scene_bounds(few), std::move(important));
         for (std::size_t i = 0; i < displays.size(); ++i)
             for (const bool moves : {false, true})
-                if (!stop.stop_requested())
+                if (!stop_)
                     picture.render(camera, displays[i], {},
                                    moves ? std::optional(picture.most_moving()) : std::nullopt,
                                    static_cast<int>(i));
         for (const PipelineKey& key : live_pipelines(device))
-            if (!stop.stop_requested()) made_.emplace_back(window, key);
+            if (!stop_) made_.emplace_back(window, key);
     } catch (const std::exception&) {  // the window reports the error where it matters
     }
 }

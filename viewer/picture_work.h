@@ -8,13 +8,12 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <stop_token>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "engine/core/image.h"
+#include "engine/core/on_threads.h"
 #include "engine/gpu/device.h"
 #include "engine/gpu/pipeline.h"
 #include "engine/render/free_space.h"
@@ -132,6 +131,7 @@ class WarmUp {
     /// under way.
     WarmUp(Device& window, DeviceOptions options, const SplatModel& model,
            std::vector<DisplaySettings> displays, const Camera& camera, std::function<void()> wake);
+    ~WarmUp() { stop_ = true; }
     /// Whether it is over, even where it failed, as the window then compiles itself.
     bool done() const { return done_; }
     /// Once it is done: the pipelines for the window's device, to be kept until its pictures are
@@ -139,12 +139,11 @@ class WarmUp {
     std::vector<Pipeline> take_pipelines() { return std::move(made_); }
 
   private:
-    void run(const std::stop_token& stop, Device& window, const DeviceOptions& options,
-             const SplatModel& few, const std::vector<DisplaySettings>& displays,
-             const Camera& camera);
+    void run(Device& window, const DeviceOptions& options, const SplatModel& few,
+             const std::vector<DisplaySettings>& displays, const Camera& camera);
     std::vector<Pipeline> made_;
-    std::atomic<bool> done_{false};
-    std::jthread thread_;  // the last member
+    std::atomic<bool> done_{false}, stop_{false};
+    JoinedThread thread_;  // the last member
 };
 
 }  // namespace darb

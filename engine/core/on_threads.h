@@ -7,16 +7,32 @@
 #include <cstddef>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace darb {
+
+/// A thread that its destructor joins: std::jthread, which libc++ before 18 lacks.
+class JoinedThread {
+  public:
+    template <class Work>
+    explicit JoinedThread(Work work) : thread_(std::move(work)) {}
+    JoinedThread(JoinedThread&&) noexcept = default;
+    JoinedThread& operator=(JoinedThread&&) = delete;
+    ~JoinedThread() {
+        if (thread_.joinable()) thread_.join();
+    }
+
+  private:
+    std::thread thread_;
+};
 
 /// Calls work() on `threads` threads, the caller's among them, and returns when every call has
 /// returned. There are fewer threads where the system will not start that many, so work() must keep
 /// taking pieces until none is left. work() must not throw.
 template <class Work>
 void on_threads(std::size_t threads, const Work& work) {
-    std::vector<std::jthread> others;
+    std::vector<JoinedThread> others;
     try {
         for (std::size_t t = 1; t < threads; ++t) others.emplace_back([&work] { work(); });
     } catch (const std::system_error&) {

@@ -14,6 +14,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/parse_number.h"
 #include "engine/data/byte_reader.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/depths.h"
@@ -238,7 +239,7 @@ class Lines {
     T number(const char* what) {
         const std::string_view text = word(what);
         T value{};
-        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const auto [end, error] = parse_number(text.data(), text.data() + text.size(), value);
         if (error != std::errc{} || end != text.data() + text.size())
             throw Error(where(), fmt::format("'{}' is no valid {}", text, what),
                         "Export the model again.");
@@ -259,13 +260,13 @@ class Lines {
 
 bool is_number(std::string_view text) {
     double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const auto [end, error] = parse_number(text.data(), text.data() + text.size(), value);
     return error == std::errc{} && end == text.data() + text.size();
 }
 
 float number_or_nan(std::string_view text) {
     double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const auto [end, error] = parse_number(text.data(), text.data() + text.size(), value);
     return error == std::errc{} && end == text.data() + text.size()
                ? static_cast<float>(value)
                : std::numeric_limits<float>::quiet_NaN();
@@ -414,7 +415,7 @@ PointCloud parse_colmap_points_text(std::string_view file, const std::string& wh
             const std::string_view word = lines.word("the point's index in the track");
             std::uint32_t observation = 0xFFFFFFFFu;  // matches no observation where the word is
                                                       // not a number
-            std::from_chars(word.data(), word.data() + word.size(), observation);
+            parse_number(word.data(), word.data() + word.size(), observation);
             if (observations) observations->push_back(observation);
         }
         points.seen_begin.push_back(points.seen_by.size());

@@ -16,6 +16,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
+#include "engine/core/parse_number.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/depths.h"
 #include "engine/data/image_io.h"
@@ -37,7 +38,7 @@ double to_number(const json& value, const char* key, const std::string& where) {
     if (value.is_number()) return value.get<double>();
     const std::string text = value.is_string() ? value.get<std::string>() : "";
     double number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const auto [end, error] = parse_number(text.data(), text.data() + text.size(), number);
     if (error != std::errc{} || end != text.data() + text.size())
         throw Error(where, fmt::format("{} is not a number", key), kCorrectEntry);
     return number;

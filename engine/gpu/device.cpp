@@ -79,6 +79,11 @@ Device::State::State(const DeviceOptions& options, bool validation)
     if (faults.binding_bytes != 0) info.max_storage_buffer_bytes = faults.binding_bytes;
     if (faults.discrete) info.unified_memory = false;
     if (faults.allocation_bytes != 0) info.max_allocation_bytes = faults.allocation_bytes;
+    if (faults.storage_buffers != 0)
+        info.max_storage_buffers = static_cast<std::uint32_t>(
+            std::min<std::uint64_t>(info.max_storage_buffers, faults.storage_buffers));
+    if (faults.own_subgroups) info.requires_subgroup_size = false;
+    keep_subgroup_sizes(info);
     info.max_storage_buffer_bytes =
         std::min(info.max_storage_buffer_bytes, info.max_allocation_bytes);
     tuning = usual_tuning(info);

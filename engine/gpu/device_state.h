@@ -71,6 +71,9 @@ int compute_queue_family(VkPhysicalDevice device);
 
 /// The shaders that bind the most storage buffers: of a rendering, and of all.
 constexpr std::string_view kRendering = "project", kTraining = "project_backward";
+/// The most that a shader may bind. MoltenVK has 31 places for buffers, of which it takes one for
+/// push constants and others for what Metal cannot tell a shader.
+constexpr std::uint32_t kMostStorageBuffers = 28;
 /// What a shader binds of them.
 std::uint32_t storage_buffers(std::string_view shader);
 /// Why a device cannot run this shader for want of them, or "".

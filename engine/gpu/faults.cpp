@@ -30,16 +30,17 @@ void parse_one(std::string_view text, Faults& faults) {
         faults.out_of_memory.emplace_back(text.substr(kOom.size()));
         return;
     }
-    if (text == "discrete") {
-        faults.discrete = true;
-        return;
-    }
+    const std::pair<std::string_view, bool*> switches[] = {
+        {"discrete", &faults.discrete}, {"own_subgroups", &faults.own_subgroups}};
+    for (const auto& [name, value] : switches)
+        if (text == name) {
+            *value = true;
+            return;
+        }
     const std::pair<std::string_view, std::uint64_t*> counts[] = {
-        {"lost:", &faults.lost_at_submit},
-        {"binding:", &faults.binding_bytes},
-        {"allocation:", &faults.allocation_bytes},
-        {"allocations:", &faults.allocations},
-        {"memory:", &faults.memory_bytes}};
+        {"lost:", &faults.lost_at_submit},         {"binding:", &faults.binding_bytes},
+        {"allocation:", &faults.allocation_bytes}, {"allocations:", &faults.allocations},
+        {"buffers:", &faults.storage_buffers},     {"memory:", &faults.memory_bytes}};
     for (const auto& [name, value] : counts)
         if (const auto number = number_of(text, name); number.value_or(0) > 0) {
             *value = *number;
@@ -50,8 +51,9 @@ void parse_one(std::string_view text, Faults& faults) {
         return;
     }
     throw Error("DARB_FAULT", "\"" + std::string(text) + "\" is no fault",
-                "Write oom:BUFFER, lost:N, binding:N, allocation:N, allocations:N, memory:N, "
-                "timestamps:BITS or discrete, separated by commas, or unset it.");
+                "Write oom:BUFFER, lost:N, binding:N, allocation:N, allocations:N, buffers:N, "
+                "memory:N, timestamps:BITS, own_subgroups or discrete, separated by commas, or "
+                "unset it.");
 }
 
 }  // namespace

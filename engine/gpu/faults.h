@@ -6,7 +6,9 @@
 //   binding:N  the device says that a storage buffer binding holds at most N bytes
 //   allocation:N  the device says that a buffer has at most N bytes
 //   allocations:N  the driver allows N allocations of memory at once
+//   buffers:N  a shader binds at most N storage buffers
 //   timestamps:N  of a timestamp only the lowest N bits are right; 0: there are none
+//   own_subgroups  no size of subgroups can be required, the device has its own
 //   discrete   the device has memory of its own, which the host does not reach
 //   memory:N   buffers beyond N bytes in all fail as if the device were out of memory
 // None in normal use. A text that is none of these is an Error.
@@ -27,7 +29,9 @@ struct Faults {
     std::uint64_t allocation_bytes = 0;      // 0 = what the device says
     std::uint64_t memory_bytes = 0;          // 0 = no limit
     std::uint64_t allocations = 0;           // 0 = what the driver allows
+    std::uint64_t storage_buffers = 0;       // 0 = what the device says
     std::optional<std::uint32_t> timestamp_bits;
+    bool own_subgroups = false;
     bool discrete = false;
 
     /// in_all: bytes of all buffers, including this one.

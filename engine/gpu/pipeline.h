@@ -4,7 +4,6 @@
 
 #include <darb_constant_names.h>
 #include <vulkan/vulkan.h>
-#include <compare>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +14,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -30,7 +30,8 @@ class ConstantName {
     consteval ConstantName(const char (&name)[n])
         : text_(declared(std::string_view(name, n - 1))) {}  // implicit, as SpecValue
     constexpr std::string_view text() const { return text_; }
-    auto operator<=>(const ConstantName&) const = default;
+    bool operator==(const ConstantName&) const = default;
+    bool operator<(const ConstantName& other) const { return text_ < other.text_; }
 
   private:
     static consteval std::string_view declared(std::string_view name) {
@@ -50,7 +51,10 @@ struct SpecValue {
     template <class T>
     requires std::constructible_from<std::variant<std::int32_t, float>, T> SpecValue(T of)
         : value(of) {}  // implicit, so that tables are lists of names and values
-    auto operator<=>(const SpecValue&) const = default;
+    bool operator==(const SpecValue&) const = default;
+    bool operator<(const SpecValue& other) const {
+        return std::tie(value, shared) < std::tie(other.value, other.shared);
+    }
 };
 
 /// Name in GLSL -> value. A pipeline aborts on a name that its shader does not declare, as that
@@ -81,7 +85,12 @@ struct PipelineKey {
     SpecConstants constants;
     bool require_full_subgroups = true;
     std::uint32_t subgroup_size = 0;
-    auto operator<=>(const PipelineKey&) const = default;
+    bool operator==(const PipelineKey&) const = default;
+    bool operator<(const PipelineKey& other) const {
+        return std::tie(shader, constants, require_full_subgroups, subgroup_size) <
+               std::tie(other.shader, other.constants, other.require_full_subgroups,
+                        other.subgroup_size);
+    }
 };
 
 /// A handle: copies share the pipeline, and so do all of a device with the same key. It lives as

@@ -13,6 +13,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/text.h"
 #include "engine/mesh/mesh_file.h"
 #include "engine/scene/edit_splats.h"
@@ -268,7 +269,7 @@ class ObjReader {
 
     double number(std::string_view word) const {
         double value = 0;
-        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+        const auto [end, error] = parse_number(word.data(), word.data() + word.size(), value);
         if (error == std::errc::invalid_argument || end != word.data() + word.size())
             fail(fmt::format("'{}' is not a number", printable(word.substr(0, 40))));
         return value;  // 0 where it is beyond double
@@ -298,7 +299,7 @@ class ObjReader {
     /// The index of a word such as 3, -1: from the first or back from the last of `count`.
     std::uint32_t index(std::string_view word, std::size_t count, const char* what) const {
         long long value = 0;
-        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+        const auto [end, error] = parse_number(word.data(), word.data() + word.size(), value);
         if (error != std::errc{} || end != word.data() + word.size())
             fail(fmt::format("'{}' names no {}", printable(word.substr(0, 40)), what));
         const long long at = value < 0 ? static_cast<long long>(count) + value : value - 1;

@@ -443,11 +443,14 @@ ViewGradients GradientRenderer::backward(const ImageF& d_image, const ImageF& d_
         view.shown.push_back(shown[2 * i + 1] != 0 ? 1 : 0);
     }
     view.d_background = background_gradient(d_image, s.transmittance);
-    if (s.options.camera)
-        view.d_camera = camera_gradient(
-            s.camera,
-            n > 0 ? s.camera_shares.download<float>(n * CAMERA_SHARES) : std::vector<float>{},
-            view.d.position);
+    if (!s.options.camera) return view;
+    const auto shares =
+        n > 0 ? s.camera_shares.download<float>(n * CAMERA_SHARES) : std::vector<float>{};
+    view.d_camera = camera_gradient(s.camera, shares, view.d.position);
+    view.d_mean.reserve(2 * n);  // moves with the principal point
+    for (size_t i = 0; i < n; ++i)
+        view.d_mean.insert(view.d_mean.end(), {shares[CAMERA_SHARES * i + CAMERA_SHARES - 2],
+                                               shares[CAMERA_SHARES * i + CAMERA_SHARES - 1]});
     return view;
 }
 

@@ -55,6 +55,10 @@ struct ViewGradients {
                                       // in d
     glm::dvec3 d_background{0.0};
     std::optional<CameraGradient> d_camera;  // if GradientOptions::camera
+    /// [N][2] dL/d(projected mean), 1/px, if GradientOptions::camera; 0 for what is not shown.
+    /// Where a mean lies so far outside the picture that the projection of its ellipsoid is held at
+    /// the margin, the share of that is in it, too.
+    std::vector<float> d_mean;
 };
 
 struct GradientOptions {

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "engine/core/error.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/text.h"
 
 namespace darb {
@@ -99,7 +100,7 @@ std::vector<std::string_view> split_words(std::string_view line) {
 
 std::uint64_t parse_count(std::string_view word, const std::string& where, std::string_view line) {
     std::uint64_t count = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), count);
+    const auto [end, error] = parse_number(word.data(), word.data() + word.size(), count);
     if (error != std::errc{} || end != word.data() + word.size())
         throw Error(where, fmt::format("header line '{}' has no valid count", line), kCopyAgain);
     return count;
@@ -220,7 +221,7 @@ class RowReader {
         if (at_ == file_.size()) fail(element, row, "the file ends here");
         if (text[at_] == '+') ++at_;
         double value = 0;
-        const auto [end, error] = std::from_chars(text + at_, text + file_.size(), value);
+        const auto [end, error] = parse_number(text + at_, text + file_.size(), value);
         if (error == std::errc::invalid_argument) fail_at_word(element, row);
         if (error == std::errc::result_out_of_range)  // too small: about 0; too large: infinite
             value = std::strtod(std::string(text + at_, end).c_str(), nullptr);

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The examples in tiny form: each ends, prints figures and writes a picture."""
 
+import importlib.util
 import pathlib
 import subprocess
 import sys
@@ -36,6 +37,12 @@ class Examples(unittest.TestCase):
         figures = [float(line.split(" dB ")[0].split()[-1]) for line in said.splitlines() if " dB " in line]
         self.assertEqual(len(figures), 3, said)
         self.assertGreater(min(figures), 14)
+
+    @unittest.skipIf(importlib.util.find_spec("torch") is None, "torch is not here")
+    def test_fit_gsplat(self):
+        said = self.run_example("fit_gsplat", "--splats", "60", "--steps", "30", "--size", "48")
+        first, last = (float(part.split()[-1]) for part in said.split(" dB ")[:2])
+        self.assertGreater(last, first + 5, said)
 
     def test_compare_gradients(self):
         said = self.run_example("compare_gradients", "--size", "48", "--points", "17")

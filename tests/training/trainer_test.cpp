@@ -346,7 +346,8 @@ TEST(Training, a_driver_with_few_allocations_or_the_largest_bindings_trains_the_
     Trainer whole = t.trainer();
     run_to(whole, 30);
     for (const char* fault :
-         {"allocations:8,timestamps:0", "binding:4294967295,allocation:1099511627776"}) {
+         {"allocations:8,timestamps:0", "binding:4294967295,allocation:1099511627776",
+          "buffers:28,own_subgroups"}) {
         SCOPED_TRACE(fault);
         ::setenv("DARB_FAULT", fault, 1);
         Device other{test::device_options()};

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "engine/core/error.h"
+#include "engine/core/on_threads.h"
 #include "engine/kernels/kernel_coefficients.h"
 #include "shaders/shared/render_args.h"
 
@@ -113,7 +114,7 @@ void run_tiles(const Work& work, TileFunction function, int threads) {
         Hits hits;
         for (std::uint32_t tile = next++; tile < tiles; tile = next++) function(work, tile, hits);
     };
-    std::vector<std::jthread> others;
+    std::vector<JoinedThread> others;
     for (int t = 1; t < threads; ++t) others.emplace_back(walk);
     walk();
 }

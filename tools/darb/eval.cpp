@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "engine/core/error.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/dataset.h"
@@ -147,7 +148,7 @@ int eval(Ranks& ranks, EvalFlags flags) {
 
 double size_to_measure_at(const std::string& word) {
     double size = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), size);
+    const auto [end, error] = parse_number(word.data(), word.data() + word.size(), size);
     if (error != std::errc{} || end != word.data() + word.size() || !(size >= 0.01 && size <= 100))
         throw CLI::ValidationError(
             "--scales", fmt::format("{} is neither a number of 0.01 to 100, nor linear or "

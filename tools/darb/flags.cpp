@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/core/error.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/kernels/kernel_expression.h"
@@ -205,9 +206,9 @@ void add_unit_options(CLI::App& command, StoredUnits& units, bool with_scales) {
 PixelSize parse_size(const std::string& text) {
     PixelSize size;
     const char* end = text.data() + text.size();
-    const auto [x, error] = std::from_chars(text.data(), end, size.width);
+    const auto [x, error] = parse_number(text.data(), end, size.width);
     const bool has_x = error == std::errc() && x != end && *x == 'x';
-    const auto last = has_x ? std::from_chars(x + 1, end, size.height) : std::from_chars_result{};
+    const auto last = has_x ? parse_number(x + 1, end, size.height) : std::from_chars_result{};
     const bool whole = has_x && last.ec == std::errc() && last.ptr == end;
     if (!whole || size.width < 16 || size.height < 16 || size.width > 16384 || size.height > 16384)
         throw Error("--size", "'" + text + "' is no size", "Write WIDTHxHEIGHT, 16 to 16384 px.");
@@ -288,7 +289,7 @@ std::vector<double> numbers_from(const std::string& option, const std::string& t
     const char *at = text.data(), *end = at + text.size();
     while (at <= end && values.size() <= count) {
         double value = 0;
-        const auto [rest, error] = std::from_chars(at, end, value);
+        const auto [rest, error] = parse_number(at, end, value);
         if (error != std::errc{} || !std::isfinite(value) || (rest != end && *rest != ',')) break;
         values.push_back(value);
         at = rest + 1;

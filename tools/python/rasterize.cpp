@@ -131,6 +131,7 @@ py::tuple rasterize(const std::shared_ptr<PyDevice>& device, const py::dict& opt
 struct Sums {
     SplatArrays<float> d;
     std::vector<double> viewmats, intrinsics, backgrounds;
+    std::vector<float> means2d;  // [C][N][2]
     std::vector<float> mean_ndc;
     std::vector<std::uint32_t> shown;
     std::uint64_t bad = 0;
@@ -165,6 +166,7 @@ void add_view(Sums& sums, ViewGradients view) {
     add_into(sums.mean_ndc, view.mean_gradient_ndc);
     add_into(sums.shown, view.shown);
     sums.bad += view.status.bad_gradients;
+    sums.means2d.insert(sums.means2d.end(), view.d_mean.begin(), view.d_mean.end());
     add_camera(sums, view);
 }
 
@@ -206,6 +208,7 @@ py::dict gradients_dict(const Sums& sums, int kernel, int sh_degree, const Pictu
     if (!sums.viewmats.empty()) {
         d["viewmats"] = to_array(narrowed(sums.viewmats), {c, 4, 4});
         d["Ks"] = to_array(narrowed(sums.intrinsics), {c, 3, 3});
+        d["means2d"] = to_array(sums.means2d, {c, n, 2});
     }
     d["means_ndc_norm"] = to_array(sums.mean_ndc, {n});
     d["shown"] = to_array(sums.shown, {n});

@@ -131,6 +131,7 @@ TEST(ListDevices, too_few_storage_buffers_are_a_reason) {
               std::string::npos);
     for (const ShaderBinary& shader : shader_table())
         EXPECT_LE(storage_buffers(shader.name), training) << shader.name;
+    EXPECT_LE(training, kMostStorageBuffers) << "MoltenVK has no more places";
     for (const char* shader :
          {"compact", "emit", "emit_huge", "tile_ranges", "blend", "depth_light", "upsample",
           "scan_apply", "radix_scatter_ballot", "display"})
@@ -311,6 +312,10 @@ TEST(Faults, text_that_is_no_fault_is_an_error) {
     EXPECT_TRUE(limits.fails_allocation("c", 101));
     EXPECT_EQ(parse_faults("timestamps:0").timestamp_bits, 0U);
     EXPECT_NE(error_of([] { parse_faults("timestamps:65"); }), "no error");
+    const Faults molten = parse_faults("buffers:31,own_subgroups");
+    EXPECT_EQ(molten.storage_buffers, 31U);
+    EXPECT_TRUE(molten.own_subgroups);
+    EXPECT_FALSE(limits.own_subgroups);
     EXPECT_TRUE(parse_faults("allocations:2").fails_allocations(3));
     EXPECT_FALSE(parse_faults("allocations:2").fails_allocations(2));
     EXPECT_FALSE(faults.fails_submit(2));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "tools/lab/make_scene/capture.h"
+#include "engine/core/on_threads.h"
 
 #include <fmt/format.h>
 
@@ -167,7 +168,7 @@ std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& vi
         for (std::size_t i = next++; i < views.size(); i = next++)
             photos[i] = take_photo(world, views[i].camera, seed + i, samples);
     };
-    std::vector<std::jthread> threads;
+    std::vector<JoinedThread> threads;
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
         threads.emplace_back(work);
     threads.clear();

@@ -2,7 +2,8 @@
 """darb: 3D splats with a choice of kernel, on any Vulkan device.
 
 Arrays in, arrays out: numpy arrays of float32, or whatever supports DLPack or the buffer protocol
-and lies on the host. darb.torch does the same with gradients for PyTorch.
+and lies on the host. darb.torch does the same with gradients for PyTorch, and darb.gsplat by the call
+of gsplat.
 
     rasterize           turns splats and cameras into pictures
     rasterize_backward  the gradients of a loss of the pictures, for every input
@@ -134,7 +135,8 @@ def rasterize_backward(d_image, d_alpha=None, *, means, quats=None, scales=None,
     and opacities.
 
     With camera there are also "viewmats" [C, 4, 4] and "Ks" [C, 3, 3]. Their numbers are treated as
-    independent, as gsplat does; for a rotation only the part along rotations counts.
+    independent, as gsplat does; for a rotation only the part along rotations counts. "means2d"
+    [C, N, 2] is then dL/d(projected mean) in 1/px, camera by camera.
     "means_ndc_norm" [N] is |dL/d(projected mean)| in units of half the picture's sides, and "shown"
     [N] tells in how many pictures a splat is seen; density control uses these two. "not_finite"
     counts splats whose gradients exceeded float32; they are 0. picture: info["picture"] of the call

@@ -34,11 +34,15 @@ def _array(name, value):
 
 
 class _Rasterize(_torch.autograd.Function):
+    """means2d [N, 2] is not read: it is what dL/d(projected mean) goes to, and only where wanted() says
+    so, because that takes another picture. The gradients of all others do not depend on it."""
+
     @staticmethod
-    def forward(ctx, settings, *tensors):
+    def forward(ctx, settings, wanted, means2d, *tensors):
         given = {name: _array(name, value) for name, value in zip(_INPUTS, tensors)}
         image, alpha, info = _darb.rasterize(**given, **settings)
         ctx.settings = settings
+        ctx.wanted = wanted
         ctx.picture = info["picture"]
         ctx.others = [None if isinstance(t, _torch.Tensor) else t for t in tensors]
         ctx.save_for_backward(*(t if isinstance(t, _torch.Tensor) else None for t in tensors))
@@ -49,8 +53,9 @@ class _Rasterize(_torch.autograd.Function):
     def backward(ctx, d_image, d_alpha, _):
         saved = [t if t is not None else other for t, other in zip(ctx.saved_tensors, ctx.others)]
         given = {name: _array(name, value) for name, value in zip(_INPUTS, saved)}
-        wants = dict(zip(_INPUTS, ctx.needs_input_grad[1:]))
-        camera = wants["viewmats"] or wants["Ks"]
+        wants = dict(zip(_INPUTS, ctx.needs_input_grad[3:]))
+        projected = ctx.needs_input_grad[2] and ctx.wanted()
+        camera = wants["viewmats"] or wants["Ks"] or projected
         settings = {k: v for k, v in ctx.settings.items() if k != "depth"}
         d = _darb.rasterize_backward(
             d_image.contiguous().numpy(), d_alpha.contiguous().numpy(), **given, **settings,
@@ -62,7 +67,8 @@ class _Rasterize(_torch.autograd.Function):
         for name, value in zip(_INPUTS, saved):
             wanted = wants[name] and name in d
             gradients.append(_torch.from_numpy(d[name]).to(value.dtype) if wanted else None)
-        return (None, *gradients)
+        means2d = _torch.from_numpy(d["means2d"].sum(0)) if projected else None
+        return (None, None, means2d, *gradients)
 
 
 def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh=None, shapes=None,
@@ -79,5 +85,5 @@ def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh
     settings = dict(width=width, height=height, kernel=kernel, footprint=footprint,
                     sh_degree=sh_degree, antialiased=antialiased, near=near, accuracy=accuracy,
                     depth=depth, device=device)
-    return _Rasterize.apply(settings, means, quats, scales, opacities, colors, sh, shapes, viewmats,
-                            Ks, background)
+    return _Rasterize.apply(settings, None, None, means, quats, scales, opacities, colors, sh, shapes,
+                            viewmats, Ks, background)
