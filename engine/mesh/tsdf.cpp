@@ -149,6 +149,13 @@ void add_blocks_of_view(const DepthView& view, const TsdfOptions& options, const
         }
 }
 
+// As the passes place it: in float, so that both say the same of a point.
+glm::vec3 voxel_place(const glm::ivec3& first, std::size_t within, double voxel) {
+    const auto side = static_cast<std::size_t>(BLOCK_SIDE);
+    const glm::ivec3 in_block(within % side, within / side % side, within / (side * side));
+    return glm::vec3(first + in_block) * static_cast<float>(voxel);
+}
+
 /// Blocks of a range, which come first, and those around it that its cubes have corners in.
 struct BlockRange {
     std::uint32_t own = 0;
@@ -225,7 +232,7 @@ constexpr std::uint64_t kOutputBytes = 24'000;
 class RangeFusion {
   public:
     RangeFusion(Device& device, const std::vector<DepthView>& views, const glm::dvec3& origin,
-                const TsdfOptions& options);
+                const TsdfOptions& options, const SurfaceField* field);
     /// Blocks that a range with its shell may have.
     std::uint32_t capacity() const { return capacity_; }
     /// False where the surface of the range is more than the buffers hold.
@@ -233,12 +240,14 @@ class RangeFusion {
 
   private:
     void integrate(std::uint32_t blocks);
+    void ask_field(const BlockRange& range);
     gpu::SurfaceArgs count(const BlockRange& range, std::array<std::uint32_t, 2>& totals);
     bool emit(const BlockRange& range, const gpu::SurfaceArgs& args,
               const std::array<std::uint32_t, 2>& totals, RawSurface& to);
 
     Device* device_;
     TsdfOptions options_;
+    const SurfaceField* field_;
     std::size_t view_count_;
     ViewBatch batch_;
     std::uint32_t capacity_;
@@ -264,9 +273,11 @@ std::uint32_t capacity_for(const TsdfOptions& options, const Device& device) {
 }
 
 RangeFusion::RangeFusion(Device& device, const std::vector<DepthView>& views,
-                         const glm::dvec3& origin, const TsdfOptions& options)
+                         const glm::dvec3& origin, const TsdfOptions& options,
+                         const SurfaceField* field)
     : device_(&device),
       options_(options),
+      field_(field),
       view_count_(views.size()),
       batch_(device, views, origin, batch_pixels(options, device), false),
       capacity_(capacity_for(options, device)),
@@ -307,6 +318,26 @@ void RangeFusion::integrate(std::uint32_t blocks) {
         commands_.submit_and_wait();
         first = end;
     }
+}
+
+// The distances say which voxels are near a surface that a view sees: the others keep no value.
+void RangeFusion::ask_field(const BlockRange& range) {
+    constexpr float kFree = 0.9999f;  // of the band, in the mean: some view is within it
+    auto sums = sums_.download<glm::vec2>(range.blocks.size() * BLOCK_VOXELS);
+    std::vector<glm::vec3> points;
+    std::vector<std::size_t> which;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const bool is_near = sums[i].y > 0 && sums[i].x < kFree * sums[i].y;
+        sums[i] = glm::vec2(0.0f);
+        if (!is_near) continue;
+        const glm::ivec3 place = range.places[i / BLOCK_VOXELS] * int(BLOCK_SIDE);
+        points.push_back(voxel_place(place, i % BLOCK_VOXELS, options_.voxel));
+        which.push_back(i);
+    }
+    const std::vector<float> values = field_->at_voxels(points);
+    for (std::size_t k = 0; k < which.size(); ++k)
+        if (!std::isnan(values[k])) sums[which[k]] = {values[k], 1.0f};
+    sums_.upload(sums);
 }
 
 gpu::SurfaceArgs RangeFusion::count(const BlockRange& range, std::array<std::uint32_t, 2>& totals) {
@@ -362,6 +393,7 @@ bool RangeFusion::add(const BlockRange& range, RawSurface& to) {
     places_.upload(range.places);
     neighbours_.upload(range.neighbours);
     integrate(static_cast<std::uint32_t>(range.blocks.size()));
+    if (field_ != nullptr) ask_field(range);
     std::array<std::uint32_t, 2> totals{};
     const gpu::SurfaceArgs args = count(range, totals);
     return emit(range, args, totals, to);
@@ -379,8 +411,9 @@ BlockRange fitting_range(const BlockIndex& index, std::uint32_t first, std::uint
     }
 }
 
-// Vertices that faces use, once each, in the order of their edges' names.
-void join(RawSurface& raw, TriangleMesh& mesh) {
+// Vertices that faces use, once each, in the order of their edges' names, which it returns.
+std::vector<std::uint64_t> join(RawSurface& raw, TriangleMesh& mesh) {
+    std::vector<std::uint64_t> names;
     std::vector<std::uint32_t> order(raw.vertices.size());
     std::iota(order.begin(), order.end(), 0u);
     std::vector<bool> used(raw.vertices.size());
@@ -390,13 +423,32 @@ void join(RawSurface& raw, TriangleMesh& mesh) {
     std::ranges::stable_sort(order, {}, [&](std::uint32_t v) { return raw.names[v]; });
     std::vector<std::uint32_t> place(raw.vertices.size());
     for (std::size_t i = 0; i < order.size(); ++i) {
-        if (i == 0 || raw.names[order[i]] != raw.names[order[i - 1]])
+        if (i == 0 || raw.names[order[i]] != raw.names[order[i - 1]]) {
             mesh.position.push_back(raw.vertices[order[i]]);
+            names.push_back(raw.names[order[i]]);
+        }
         place[order[i]] = static_cast<std::uint32_t>(mesh.position.size() - 1);
     }
     mesh.face = std::move(raw.faces);
     for (auto& face : mesh.face)
         for (std::uint32_t& corner : face) corner = place[corner];
+    return names;
+}
+
+std::vector<VoxelEdge> edges_named(const std::vector<std::uint64_t>& names,
+                                   const std::vector<BlockPlace>& places, double voxel) {
+    std::vector<VoxelEdge> edges;
+    edges.reserve(names.size());
+    for (const std::uint64_t name : names) {
+        const BlockPlace& block = places[name / (8 * BLOCK_VOXELS)];
+        const glm::ivec3 first = glm::ivec3(block[0], block[1], block[2]) * int(BLOCK_SIDE);
+        const auto within = static_cast<std::size_t>(name / 8 % BLOCK_VOXELS);
+        const auto d = static_cast<int>(name % 8);
+        const glm::ivec3 along(d & 1, d >> 1 & 1, d >> 2);
+        edges.push_back(
+            {voxel_place(first, within, voxel), voxel_place(first + along, within, voxel)});
+    }
+    return edges;
 }
 
 void cut_to(const WorldBox& box, TriangleMesh& mesh) {
@@ -467,7 +519,7 @@ TsdfOptions with_defaults(TsdfOptions options, const std::vector<DepthView>& vie
 
 TriangleMesh fuse_depths(Device& device, const std::vector<DepthView>& views,
                          const glm::dvec3& origin, const TsdfOptions& asked, TsdfReport& report,
-                         const MeshProgress& progress) {
+                         const MeshProgress& progress, const SurfaceField* field) {
     const TsdfOptions options = with_defaults(asked, views);
     const std::vector<BlockPlace> places = blocks_of_surface(views, options, origin);
     report = {options.voxel, options.farthest, places.size(), 0};
@@ -478,7 +530,7 @@ TriangleMesh fuse_depths(Device& device, const std::vector<DepthView>& views,
     const BlockIndex index(places);
     RawSurface raw;
     {
-        RangeFusion fusion(device, views, origin, options);
+        RangeFusion fusion(device, views, origin, options, field);
         std::uint32_t most = fusion.capacity();
         for (std::uint32_t first = 0; first < places.size();) {
             if (progress) progress("surface", double(first) / double(places.size()));
@@ -493,7 +545,8 @@ TriangleMesh fuse_depths(Device& device, const std::vector<DepthView>& views,
     }
     TriangleMesh mesh;
     mesh.origin = {origin.x, origin.y, origin.z};
-    join(raw, mesh);
+    const std::vector<std::uint64_t> names = join(raw, mesh);
+    if (field != nullptr) field->on_edges(edges_named(names, places, options.voxel), mesh.position);
     if (options.bounds) cut_to(*options.bounds, mesh);
     set_normals(mesh);
     return mesh;

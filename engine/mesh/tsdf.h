@@ -8,7 +8,9 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "engine/mesh/depth_views.h"
@@ -34,6 +36,21 @@ struct TsdfReport {
     std::size_t blocks = 0, ranges = 0;
 };
 
+/// An edge of the voxels, or a diagonal of them, relative to SplatModel::origin.
+struct VoxelEdge {
+    glm::vec3 from, to;
+};
+
+/// What a surface is the zero of, where it is not that of the distances.
+struct SurfaceField {
+    /// Negative inside, positive outside, NaN where nothing is known, at voxels of which some view
+    /// says that its surface is within the band.
+    std::function<std::vector<float>(std::span<const glm::vec3> points)> at_voxels;
+    /// Puts vertices on the zero, each on its edge, whose ends have different signs.
+    std::function<void(std::span<const VoxelEdge> edges, std::vector<glm::vec3>& position)>
+        on_edges;
+};
+
 /// A block of BLOCK_SIDE voxels a side by its place, in sides of a block.
 using BlockPlace = std::array<std::int32_t, 3>;
 
@@ -47,10 +64,11 @@ TsdfOptions with_defaults(TsdfOptions options, const std::vector<DepthView>& vie
 
 /// Positions, faces and normals of the zero level; origin: SplatModel::origin, to which positions
 /// are relative. Throws Error where no view sees a surface, and NoRoom where the result would not
-/// fit into the memory of the host, naming a voxel for which it would.
+/// fit into the memory of the host, naming a voxel for which it would. field: another field, whose
+/// zero is looked for in the same voxels.
 TriangleMesh fuse_depths(Device& device, const std::vector<DepthView>& views,
                          const glm::dvec3& origin, const TsdfOptions& options, TsdfReport& report,
-                         const MeshProgress& progress = {});
+                         const MeshProgress& progress = {}, const SurfaceField* field = nullptr);
 
 /// Unit normals of the vertices: the mean of those of their faces, by area.
 void set_normals(TriangleMesh& mesh);

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: MIT
-// MedianDepth: at each pixel the depth at which half of the light, or another share, is left. It
-// reads the lists of a frame and needs no picture. docs/math.md has the formulas and their source.
+// What the splats of a frame leave of the light along a ray. MedianDepth: at each pixel the depth
+// at which half of it, or another share, is left. PointLight: the share that is left at a point.
+// Both read the lists of a frame and need no picture. docs/math.md has the formulas and their
+// source.
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string_view>
+#include <vector>
 
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
@@ -32,6 +36,22 @@ std::optional<DepthReading> depth_reading_from_name(std::string_view name);
 /// again along a ray.
 DepthReading usual_reading(int kernel);
 
+/// What each splat is along the rays of a view: the slope of its depth over the picture, and its
+/// deviation.
+class DepthPlanes {
+  public:
+    DepthPlanes(Device& device, const ForwardOptions& options);
+    void record(Commands& commands, const GpuSplats& splats, const FrameView& view,
+                const Frame& frame);
+    /// vec3 [N] of the last record(), where a splat is visible.
+    const Buffer& planes() const { return planes_; }
+
+  private:
+    Device* device_;
+    Pipeline pass_;
+    Buffer planes_;
+};
+
 class MedianDepth {
   public:
     /// options: those of the frames. reading: any but `expected`. Throws Error where the kernel
@@ -51,11 +71,37 @@ class MedianDepth {
     static std::uint64_t device_bytes(std::uint32_t splats, std::uint64_t pixels);
 
   private:
-    void reserve(std::uint32_t splats, std::uint64_t pixels, std::uint32_t segments);
+    void reserve(std::uint64_t pixels, std::uint32_t segments);
 
     Device* device_;
-    Pipeline plane_, bracket_pass_, walk_;
-    Buffer planes_, bracket_, part_, product_, depth_;
+    DepthPlanes planes_;
+    Pipeline bracket_pass_, wide_walk_, walk_;
+    Buffer bracket_, ends_, product_, depth_;
+};
+
+/// A point in the space of a view: where it is in the picture, px, and its depth along the optical
+/// axis, world units.
+struct ViewPoint {
+    float x = 0, y = 0, depth = 0;
+};
+
+class PointLight {
+  public:
+    /// As MedianDepth.
+    PointLight(Device& device, const ForwardOptions& options, DepthReading reading);
+
+    /// The share of the light that is left at each point, which must be in the picture. Records and
+    /// submits `commands`, after the same steps as for MedianDepth::record.
+    std::vector<float> find(Commands& commands, const GpuSplats& splats, const FrameView& view,
+                            const Frame& frame, std::uint32_t longest_list,
+                            std::span<const ViewPoint> points);
+
+  private:
+    Device* device_;
+    DepthPlanes planes_;
+    Pipeline pass_;
+    std::uint32_t points_of_item_ = 0;
+    Buffer points_, items_, light_;
 };
 
 }  // namespace darb

@@ -139,25 +139,39 @@ const Buffer& Renderer::draw(const Camera& camera, const glm::vec3& background, 
                     "Turn ProjectionEffects::lens on, or drop the camera's lens.");
     const int degree =
         sh_degree < 0 ? accuracy_.sh_degree : std::min(sh_degree, accuracy_.sh_degree);
+    const Buffer* image = nullptr;
+    run_frame(rendered, background, degree, near_plane, [&](Frame& frame) {
+        forward_.record(commands_, splats_, view_, frame);
+        image = upsample_ ? &upsample_->record(commands_, frame.images.image, rendered, camera)
+                          : &frame.images.image;
+    });
+    return *image;
+}
+
+void Renderer::list(const Camera& camera, float near_plane) {
+    DARB_CHECK(!camera.lens.active || forward_.options().effects.lens);
+    run_frame(camera, glm::vec3(0.0f), 0, near_plane, [&](Frame& frame) {
+        forward_.record_intersections(commands_, splats_, view_, frame);
+    });
+}
+
+void Renderer::run_frame(const Camera& rendered, const glm::vec3& background, int degree,
+                         float near_plane, const std::function<void(Frame&)>& record) {
     view_ = {camera_data(rendered, splats_.origin(), near_plane), &exchange_.cameras(), 0, degree,
              background};
     Frame& frame = buffers_.frame();
     buffers_.reserve(splats_.count(), std::max(frame.size.intersections, splats_.count() * 4),
                      rendered.width, rendered.height);
-    const Buffer* image = nullptr;
     for (;;) {
         commands_.begin();
         exchange_.send(commands_, view_.camera);
-        forward_.record(commands_, splats_, view_, frame);
-        image = upsample_ ? &upsample_->record(commands_, frame.images.image, rendered, camera)
-                          : &frame.images.image;
+        record(frame);
         exchange_.fetch(commands_, frame.counters.status);
         commands_.submit_and_wait();
         status_ = exchange_.status();
         if (!buffers_.make_room(status_)) break;
     }
     pass_times_ = commands_.pass_times();
-    return *image;
 }
 
 ImageF Renderer::render_depth() {
@@ -186,6 +200,14 @@ ImageF Renderer::render_depth(DepthReading reading, float level) {
     ImageF image(static_cast<int>(view_.camera.width), static_cast<int>(view_.camera.height), 2);
     image.data = median->depth().download<float>(image.data.size());
     return image;
+}
+
+std::vector<float> Renderer::light_at(std::span<const ViewPoint> points, DepthReading reading) {
+    if (view_.camera.width == 0)
+        throw Error("render", "there is no camera to take the light of", "Call list() first.");
+    std::optional<PointLight>& light = point_light_[static_cast<std::size_t>(reading)];
+    if (!light) light.emplace(*device_, forward_.options(), reading);
+    return light->find(commands_, splats_, view_, buffers_.frame(), status_.longest_list, points);
 }
 
 }  // namespace darb

@@ -3,7 +3,10 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "engine/core/image.h"
 #include "engine/gpu/buffer.h"
@@ -76,6 +79,10 @@ class Renderer {
     const Buffer& draw(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f),
                        int sh_degree = -1, float near_plane = static_cast<float>(NEAR_DEFAULT));
 
+    /// Finds which splats a camera's pixels show, and in which order, without their picture: all
+    /// that light_at() and render_depth(reading) need.
+    void list(const Camera& camera, float near_plane = static_cast<float>(NEAR_DEFAULT));
+
     /// [H][W][2] for the camera of the last render, which must have taken place: the expected depth
     /// sum w z / sum w along the optical axis, world units, and sum w, the opacity of the pixel.
     /// Depth is 0 where nothing is seen (opacity below 1/255).
@@ -86,12 +93,19 @@ class Renderer {
     /// render_depth(), without a level. Throws Error where the kernel has no such reading.
     ImageF render_depth(DepthReading reading, float level = 0.5f);
 
+    /// The share of the light that is left at each point of the space of the last camera that was
+    /// rendered or listed; the points must be in its picture. `expected` is no reading of this.
+    std::vector<float> light_at(std::span<const ViewPoint> points, DepthReading reading);
+
     /// The status of the last render.
     gpu::FrameStatus status() const { return status_; }
     const std::vector<PassTime>& pass_times() const { return pass_times_; }
 
   private:
     Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy);
+    /// Records and submits what a frame needs, again with more room where there was too little.
+    void run_frame(const Camera& rendered, const glm::vec3& background, int degree,
+                   float near_plane, const std::function<void(Frame&)>& record);
 
     Device* device_;
     FrameAccuracy accuracy_;
@@ -104,6 +118,7 @@ class Renderer {
     gpu::FrameStatus status_{};
     FrameView view_;  // view of the last render
     std::array<std::optional<MedianDepth>, std::size(kDepthReadings)> median_;  // once asked for
+    std::array<std::optional<PointLight>, std::size(kDepthReadings)> point_light_;  // likewise
     std::vector<PassTime> pass_times_;
 };
 

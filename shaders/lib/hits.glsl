@@ -2,6 +2,7 @@
 // Packs the intersections of a stretch of the tile's list that touch the subgroup's area, so that the loop over them
 // has neither gaps nor branches. Needs the constants THREADS, SUBGROUP_SIZE and CHUNK (how many intersections are
 // looked at before those found are blended) and the buffers intersection_from_sorted and splat_from_intersection.
+// HIT_MATTERS, where it is defined, says of a splat whether it is wanted.
 #include "lib/lockstep.glsl"
 
 shared uint hit_splat[THREADS / SUBGROUP_SIZE * CHUNK];
@@ -20,7 +21,10 @@ uint collect_hits(uint begin, uint end, uint bits) {
         const uint j = batch + gl_SubgroupInvocationID;
         uint intersection = 0u;
         if (j < end) intersection = splat_from_intersection[intersection_from_sorted[j]];
-        const bool hit = (intersection & bits) != 0u;
+        bool hit = (intersection & bits) != 0u;
+#ifdef HIT_MATTERS
+        if (hit) hit = HIT_MATTERS(intersection & INTERSECTION_SPLAT_MASK);
+#endif
         const uvec4 hits = subgroupBallot(hit);
         if (hit) {
             const uint at = hits_base() + count + subgroupBallotExclusiveBitCount(hits);

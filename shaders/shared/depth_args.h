@@ -10,10 +10,9 @@
 #define DEPTH_READING_SOLID 1  // a half before its middle, a half behind, as a cloud does
 #define DEPTH_READING_PLANE 2  // all at once, in the plane of its middle
 
-#define MEDIAN_SAMPLES 8u  // depths that one walk over a list tests
-#define MEDIAN_WALKS 5u    // at most; each leaves a ninth of the bracket
-// Intersections of a tile's list that a dispatch takes: with the loop over the samples a third of
-// the rounds that LIST_SEGMENT leaves a driver.
+#define MEDIAN_SAMPLES 8u  // depths that a walk over a list tests, at most
+// Intersections of a tile's list that a dispatch takes: the pixels of a block walk it a subgroup at
+// a time, and a driver's rounds are those of LIST_SEGMENT.
 #define MEDIAN_SEGMENT 2048u
 
 #ifdef __cplusplus
@@ -33,11 +32,18 @@ struct MedianDepthArgs {
     float near_plane;  // world units along z: no surface is before it
     uint segment;      // which MEDIAN_SEGMENT of every list this dispatch takes
     uint segments;     // in all
+    uint walk;         // from 0
+};
+
+struct PointLightArgs {
+    uint items;
+    uint segment;  // as above
 };
 
 #ifdef __cplusplus
 static_assert(sizeof(DepthPlaneArgs) == 12);
-static_assert(sizeof(MedianDepthArgs) == 28);
+static_assert(sizeof(MedianDepthArgs) == 32);
+static_assert(sizeof(PointLightArgs) == 8);
 }  // namespace darb::gpu
 #endif
 #endif

@@ -101,6 +101,24 @@ TEST(MeshCommand, Has_the_same_bits_again_and_within_less_memory) {
     EXPECT_EQ(bytes, read_file(scratch_file("ranges.ply")));
 }
 
+TEST(MeshCommand, Takes_the_opacity_of_the_space) {
+    const std::string report = scratch_file("opacity.json");
+    const Outcome o = darb(mesh_of("opacity.ply", "--method opacity --json " + report));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(read_json(report)["method"], "opacity");
+    double most = 0;
+    for (const glm::vec3& p : read_mesh(scratch_file("opacity.ply")).position)
+        most = std::max(most, std::abs(glm::length(p) - 1.0));
+    EXPECT_LT(most, 0.1);
+    ASSERT_EQ(darb(mesh_of("parts.ply", "--method opacity --max-memory 3MB --json " + report)).code,
+              0);
+    EXPECT_GT(read_json(report)["ranges"], 1);
+    EXPECT_EQ(read_file(scratch_file("opacity.ply")), read_file(scratch_file("parts.ply")));
+    const Outcome mean = darb(mesh_of("mean.ply", "--method opacity --depth expected"));
+    EXPECT_EQ(mean.code, 2);
+    EXPECT_NE(mean.err.find("--depth front"), std::string::npos) << mean.err;
+}
+
 TEST(MeshCommand, Compares_with_a_reference) {
     const std::string truth = scratch_file("shape.json"), report = scratch_file("compared.json");
     write_file_atomic(truth, R"({"shapes": [{"shape": "sphere", "size": [1, 0, 0],

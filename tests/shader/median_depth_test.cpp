@@ -98,6 +98,43 @@ INSTANTIATE_TEST_SUITE_P(Kernels, EveryDepthKernel, testing::ValuesIn(every_kern
                              return name;
                          });
 
+TEST(PointLight, is_that_of_the_reference) {
+    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE})
+        for (const int reading : {DEPTH_READING_FRONT, DEPTH_READING_SOLID, DEPTH_READING_PLANE}) {
+            SCOPED_TRACE(fmt::format("{} {}", kernel_name(kernel), kDepthReadings[reading]));
+            const TestScene s = depth_scene(kernel, Footprint::psi);
+            std::vector<ViewPoint> points;
+            std::vector<double> expected;
+            const auto truth = reference::render(s.model, s.camera, {});
+            const auto& table = reference::kernel_table(s.model.kernel, s.model.footprint);
+            for (int y = 0; y < s.camera.height; ++y)
+                for (int x = 0; x < s.camera.width; ++x) {
+                    const auto slices =
+                        reference::ray_slices(truth.tiles, truth.projected, x, y, table, {});
+                    if (slices.empty()) continue;
+                    const auto& slice = slices[points.size() % slices.size()];
+                    const double z = slice.mean + slice.deviation * (0.4 - double(x % 3));
+                    points.push_back({x + 0.5f, y + 0.5f, static_cast<float>(z)});
+                    expected.push_back(light_left(slices, points.back().depth,
+                                                  static_cast<Reading>(reading), table, {}));
+                }
+            Renderer renderer(shared_device(), s.model);
+            renderer.list(s.camera);
+            const auto got = renderer.light_at(points, static_cast<DepthReading>(reading));
+            size_t wrong = 0;
+            double spread = 0;
+            for (size_t i = 0; i < got.size(); ++i) {
+                if (std::abs(got[i] - expected[i]) > 1e-4) ++wrong;
+                spread = std::max(spread, expected[i] - expected[0]);
+            }
+            EXPECT_GT(points.size(), 500u);
+            EXPECT_GT(spread, 0.1);
+            EXPECT_LE(wrong, points.size() / 50);
+            renderer.list(s.camera);
+            EXPECT_EQ(got, renderer.light_at(points, static_cast<DepthReading>(reading)));
+        }
+}
+
 TEST(MedianDepth, follows_the_level) {
     for (const double level : {0.2, 0.8})
         expect_agreement(depth_scene(KERNEL_GAUSSIAN, Footprint::psi), DEPTH_READING_FRONT, level);

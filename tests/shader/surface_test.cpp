@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The passes that fuse depths: splats laid on known surfaces come back as closed meshes of the
-// right genus, as near as a quarter of a voxel, for every kernel of the list.
+// Surfaces out of splats that are laid on known ones: closed meshes of the right genus, as near as
+// a quarter of a voxel, for every kernel of the list; and what is thin, by the opacity field.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +11,7 @@
 #include "engine/core/quantile.h"
 #include "engine/core/rng.h"
 #include "engine/mesh/clean.h"
+#include "engine/mesh/opacity.h"
 #include "engine/mesh/tsdf.h"
 #include "tests/support/every_kernel.h"
 #include "tests/support/shared_device.h"
@@ -18,16 +19,21 @@
 namespace darb::test {
 namespace {
 
-enum class Solid { ball, box, ring };
+enum class Solid { ball, box, ring, plate };
 constexpr double kBallRadius = 1, kHalfSide = 0.7, kRingRadius = 0.8, kTubeRadius = 0.35;
-constexpr const char* kSolidNames[] = {"ball", "box", "ring"};
+constexpr double kPlateHalf = 0.06;  // of its thickness
+constexpr const char* kSolidNames[] = {"ball", "box", "ring", "plate"};
+
+glm::dvec3 half_sides(Solid solid) {
+    return {kHalfSide, solid == Solid::plate ? kPlateHalf : kHalfSide, kHalfSide};
+}
 
 double signed_distance(Solid solid, const glm::dvec3& p) {
     if (solid == Solid::ball) return glm::length(p) - kBallRadius;
     if (solid == Solid::ring)
         return glm::length(glm::dvec2(glm::length(glm::dvec2(p.x, p.z)) - kRingRadius, p.y)) -
                kTubeRadius;
-    const glm::dvec3 over = glm::abs(p) - kHalfSide;
+    const glm::dvec3 over = glm::abs(p) - half_sides(solid);
     return glm::length(glm::max(over, 0.0)) + std::min(std::max({over.x, over.y, over.z}), 0.0);
 }
 
@@ -45,18 +51,22 @@ std::vector<SurfacePoint> points_on(Solid solid, double spacing) {
             const glm::dvec3 d(r * std::cos(golden * i), y, r * std::sin(golden * i));
             points.push_back({kBallRadius * d, d});
         }
-    } else if (solid == Solid::box) {
-        const int n = static_cast<int>(2 * kHalfSide / spacing);
+    } else if (solid == Solid::box || solid == Solid::plate) {
+        const glm::dvec3 half = half_sides(solid);
         for (int axis = 0; axis < 3; ++axis)
-            for (const double side : {-1.0, 1.0})
-                for (int i = 0; i < n * n; ++i) {
+            for (const double side : {-1.0, 1.0}) {
+                const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+                const int n = std::max(static_cast<int>(2 * half[b] / spacing), 1);
+                const int m = std::max(static_cast<int>(2 * half[c] / spacing), 1);
+                for (int i = 0; i < n * m; ++i) {
                     glm::dvec3 p, normal(0.0);
-                    p[axis] = side * kHalfSide;
-                    p[(axis + 1) % 3] = kHalfSide * ((2.0 * (i % n) + 1) / n - 1);
-                    p[(axis + 2) % 3] = kHalfSide * ((2.0 * (i / n) + 1) / n - 1);
+                    p[axis] = side * half[axis];
+                    p[b] = half[b] * ((2.0 * (i % n) + 1) / n - 1);
+                    p[c] = half[c] * ((2.0 * (i / n) + 1) / m - 1);
                     normal[axis] = side;
                     points.push_back({p, normal});
                 }
+            }
     } else {
         const int around = static_cast<int>(2 * std::numbers::pi * kRingRadius / spacing);
         for (int i = 0; i < around; ++i) {
@@ -218,6 +228,73 @@ TEST(Surface, has_the_same_bits_in_ranges_and_again) {
         EXPECT_EQ(a.position, other->position);
         EXPECT_EQ(a.face, other->face);
     }
+}
+
+TriangleMesh level_surface(const SplatModel& model, const std::vector<DepthView>& views,
+                           std::uint64_t working_bytes = 64 << 20) {
+    Renderer renderer(shared_device(), model);
+    OpacityField field(renderer, views, model.origin, {}, working_bytes / 4);
+    TsdfReport report;
+    return opacity_surface(shared_device(), field, views, model.origin,
+                           {.voxel = kVoxel, .truncation = 3, .working_bytes = working_bytes},
+                           report);
+}
+
+/// Share of a solid's points that the mesh has a vertex within a voxel of, and the quantiles of how
+/// far vertices are from the solid, voxels.
+struct Fit {
+    double recall, median, most;
+};
+
+Fit fit_of(const TriangleMesh& mesh, Solid solid) {
+    const auto points = points_on(solid, kSpacing);
+    double found = 0;
+    for (const SurfacePoint& point : points) {
+        const auto is_near = [&](const glm::vec3& p) {
+            return glm::distance(glm::dvec3(p), point.place) < kVoxel &&
+                   std::abs(signed_distance(solid, glm::dvec3(p))) < kVoxel / 4;
+        };
+        found += std::ranges::any_of(mesh.position, is_near) ? 1 : 0;
+    }
+    std::vector<double> errors;
+    for (const glm::vec3& p : mesh.position)
+        errors.push_back(std::abs(signed_distance(solid, glm::dvec3(p))) / kVoxel);
+    std::ranges::sort(errors);
+    return {found / double(points.size()), quantile(errors, 0.5), quantile(errors, 0.99)};
+}
+
+TEST(OpacitySurface, of_a_ball_is_closed_and_near_the_truth) {
+    const SplatModel model = splats_on(Solid::ball, KERNEL_GAUSSIAN, kSpacing);
+    const auto views = views_of(model);
+    TriangleMesh mesh = level_surface(model, views);
+    const TriangleMesh raw = mesh;
+    clean_mesh(mesh, {.keep = 1});
+    EXPECT_TRUE(is_closed(mesh));
+    EXPECT_EQ(euler_number(mesh), 2);
+    const Fit fit = fit_of(mesh, Solid::ball);
+    printf("ball by opacity: median %.3f, 99 %% %.3f voxels\n", fit.median, fit.most);
+    EXPECT_EQ(fit.recall, 1);
+    EXPECT_LE(fit.median, 0.25);
+    EXPECT_LE(fit.most, 1);
+    const TriangleMesh parts = level_surface(model, views, 1 << 19);
+    EXPECT_EQ(raw.position, parts.position);
+    EXPECT_EQ(raw.face, parts.face);
+}
+
+TEST(OpacitySurface, keeps_a_plate_that_distances_lose) {
+    const SplatModel model = splats_on(Solid::plate, KERNEL_GAUSSIAN, kSpacing);
+    const auto views = views_of(model);
+    TsdfReport report;
+    const TriangleMesh fused = fuse_depths(shared_device(), views, model.origin,
+                                           {.voxel = kVoxel, .truncation = 3}, report);
+    const TriangleMesh kept = level_surface(model, views);
+    const Fit lost = fit_of(fused, Solid::plate), fit = fit_of(kept, Solid::plate);
+    for (const Fit& f : {lost, fit})
+        printf("plate: recall %.3f, median %.3f, 99 %% %.3f voxels\n", f.recall, f.median, f.most);
+    EXPECT_LT(lost.recall, 0.7);
+    EXPECT_GT(fit.recall, 0.95);
+    EXPECT_LE(fit.median, 0.25);
+    EXPECT_LE(fit.most, 1);
 }
 
 TEST(Surface, colours_are_those_of_the_splats) {

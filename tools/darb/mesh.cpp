@@ -23,6 +23,7 @@
 #include "engine/mesh/clean.h"
 #include "engine/mesh/compare.h"
 #include "engine/mesh/mesh_file.h"
+#include "engine/mesh/opacity.h"
 #include "engine/mesh/tsdf.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/scene/subject.h"
@@ -47,7 +48,7 @@ constexpr double kWorkingShare = 0.85;  // of --max-memory for a range of blocks
 struct MeshFlags {
     std::filesystem::path scene, cameras, output, json, reference;
     std::vector<double> thresholds;  // world units; none: 1, 2 and 4 voxels
-    std::string reading = "front", bounds, max_memory, texture = "vertex", device;
+    std::string method = "tsdf", reading = "front", bounds, max_memory, texture = "vertex", device;
     std::string effects = "auto";
     float level = 0.5f, near_plane = static_cast<float>(NEAR_DEFAULT);
     double fill_holes = 0;
@@ -111,10 +112,17 @@ std::vector<View> chosen_views(const MeshFlags& flags, const SplatModel& model) 
     return views;
 }
 
-/// Depths of all views, confirmed; what the renderer holds is gone when it returns.
-std::vector<DepthView> seen_surfaces(Device& device, SplatModel model, std::vector<View> views,
-                                     const MeshFlags& flags, const EffectChoice& choice,
-                                     const MeshProgress& progress, MeshReport& report) {
+/// What the views see of the scene.
+struct Seen {
+    std::vector<DepthView> views;
+    DepthViewOptions options;
+    std::unique_ptr<Renderer> renderer;  // for --method opacity; else what it holds is gone
+};
+
+/// Depths of all views, confirmed.
+Seen seen_surfaces(Device& device, SplatModel model, std::vector<View> views,
+                   const MeshFlags& flags, const EffectChoice& choice, const MeshProgress& progress,
+                   MeshReport& report) {
     for (View& view : views) view.camera.lens = {};
     EffectPlan plan = plan_rendering(model, views, {.near_plane = flags.near_plane}, choice);
     apply_plan(plan, model);
@@ -122,16 +130,29 @@ std::vector<DepthView> seen_surfaces(Device& device, SplatModel model, std::vect
     effects.off_centre = true;  // a surface lies where the camera says, not where it nearly does
     for (const View& view : views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
-    const DepthViewOptions options{*depth_reading_from_name(flags.reading), flags.level,
-                                   flags.near_plane, flags.texture == "vertex"};
-    std::vector<DepthView> seen;
-    {
-        Renderer renderer(device, model, Accuracy{}, effects, plan.huge_splat_path());
-        seen = render_depth_views(renderer, cameras_of(views), options, progress);
-    }
-    report.views = seen.size();
-    report.depths = keep_confirmed(device, seen, model.origin, progress);
+    Seen seen;
+    seen.options = {*depth_reading_from_name(flags.reading), flags.level, flags.near_plane,
+                    flags.texture == "vertex"};
+    seen.renderer =
+        std::make_unique<Renderer>(device, model, Accuracy{}, effects, plan.huge_splat_path());
+    seen.views = render_depth_views(*seen.renderer, cameras_of(views), seen.options, progress);
+    if (flags.method == "tsdf") seen.renderer.reset();
+    report.views = seen.views.size();
+    report.depths = keep_confirmed(device, seen.views, model.origin, progress);
     return seen;
+}
+
+TriangleMesh surface_of(Device& device, Seen& seen, const glm::dvec3& origin, TsdfOptions options,
+                        TsdfReport& report, const MeshProgress& progress) {
+    if (!seen.renderer) return fuse_depths(device, seen.views, origin, options, report, progress);
+    if (device.memory_budget() > 0)
+        options.working_bytes -= std::min(options.working_bytes / 2, device.allocated_bytes());
+    OpacityField field(*seen.renderer, seen.views, origin, seen.options, options.working_bytes / 4);
+    options.working_bytes -= options.working_bytes / 4;
+    TriangleMesh mesh =
+        opacity_surface(device, field, seen.views, origin, options, report, progress);
+    seen.renderer.reset();
+    return mesh;
 }
 
 /// Whether some camera sees what is behind the point: there is no surface there.
@@ -262,6 +283,7 @@ nlohmann::json report_json(const MeshFlags& flags, const MeshReport& r, const Tr
                         {"faces", mesh.face_count()},
                         {"voxel", r.tsdf.voxel},
                         {"farthest", r.tsdf.farthest},
+                        {"method", flags.method},
                         {"depth", flags.reading},
                         {"level", flags.level},
                         {"views", r.views},
@@ -318,9 +340,9 @@ TriangleMesh make_mesh(const MeshFlags& flags, const std::atomic<bool>& stop, Me
         if (now != what) notes.emplace(now = what);
         notes->at(part);
     };
-    const std::vector<DepthView> seen =
-        seen_surfaces(device, model, views, f, choice, progress, report);
-    TriangleMesh mesh = fuse_depths(device, seen, model.origin, f.tsdf, report.tsdf, progress);
+    Seen what = seen_surfaces(device, model, views, f, choice, progress, report);
+    TriangleMesh mesh = surface_of(device, what, model.origin, f.tsdf, report.tsdf, progress);
+    const std::vector<DepthView>& seen = what.views;
     report.raw_faces = mesh.face_count();
     clean(f, seen, model.origin, mesh, report);
     if (f.texture == "vertex")
@@ -343,6 +365,10 @@ int mesh(const MeshFlags& flags) {
         flags.output.extension().empty())
         throw Error(flags.output.string(), "has no ending of a mesh",
                     "Use " + mesh_endings() + ".");
+    if (flags.method == "opacity" && flags.reading == "expected")
+        throw Error("--depth expected",
+                    "is a mean of depths, and says of no point what is before it",
+                    "Use --depth front, solid or plane with --method opacity.");
     if (flags.faces > 0 && !can_simplify())
         throw Error("--faces", "this darb was built without meshoptimizer",
                     "Install libmeshoptimizer-dev and build it again, or leave --faces out.");
@@ -367,6 +393,11 @@ int mesh(const MeshFlags& flags) {
 }
 
 void add_surface_options(CLI::App& c, MeshFlags& flags) {
+    c.add_option("--method", flags.method,
+                 "tsdf: the mean of the views' distances; opacity: where the opacity of the space "
+                 "passes 1 - level, which keeps thin things and takes longer")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"tsdf", "opacity"}));
     c.add_option("--depth", flags.reading,
                  "how a splat takes light along a ray: front, solid, plane, or expected, the mean "
                  "of the centres")
