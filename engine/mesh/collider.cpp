@@ -369,11 +369,12 @@ VoxelGrid make_grid(const glm::dmat3& axes, const dvec3& low, const dvec3& high,
     DARB_CHECK(cell > 0, "{}", cell);
     const dvec3 count = glm::max(glm::ceil((high - low) / cell - 1e-9), dvec3(1.0));
     if (const double cells = count.x * count.y * count.z; !(cells <= kMostCells))
-        throw Error("collider",
-                    fmt::format("the grid would have {:.3g} cells of {:.3g}, and may have {:.3g}",
-                                cells, cell, kMostCells),
-                    fmt::format("Take cells of at least {:.3g}, or a smaller box.",
-                                1.01 * cell * std::cbrt(cells / kMostCells)));
+        throw Error(
+            "collider",
+            fmt::format("the grid would have {:.3g} cells of {:.3g}, and may have {:.3g}", cells,
+                        cell, kMostCells),
+            fmt::format("Take cells of at least {:.3g} (--voxel), or a smaller box (--bounds).",
+                        1.01 * cell * std::cbrt(cells / kMostCells)));
     VoxelGrid grid{axes, low, cell, ivec3(count), {}};
     grid.full.assign(std::size_t(count.x) * std::size_t(count.y) * std::size_t(count.z), 0.0f);
     return grid;
@@ -418,7 +419,7 @@ TriangleMesh make_collider(const VoxelGrid& grid, const std::vector<dvec3>& came
             fmt::format("there is no surface: no cell of {:.3g} is solid from {} on, or all "
                         "are",
                         grid.cell, options.level),
-            "Take smaller cells, or another box.");
+            "Take smaller cells (--voxel), or another box (--bounds).");
     for (std::size_t faces = options.faces;; faces *= 2) {
         const TriangleMesh mesh = simplify_mesh(full, faces).mesh;
         const bool clear = std::none_of(cameras.begin(), cameras.end(), [&](const dvec3& camera) {

@@ -52,8 +52,7 @@ class TabulatedLine {
     double left(double z) const {
         const double t = (z - slice_.mean) / slice_.deviation;
         if (!(most_ > 0) || !(sum_[kPanels] > 0)) return t < 0 ? 1 : 1 - slice_.alpha;
-        const double panel =
-            kPanels * (std::asin(std::clamp(t / most_, -1.0, 1.0)) / kPi + 0.5);
+        const double panel = kPanels * (std::asin(std::clamp(t / most_, -1.0, 1.0)) / kPi + 0.5);
         const auto low = std::min(static_cast<std::size_t>(panel), kPanels - 1);
         const double sum =
             sum_[low] + (panel - static_cast<double>(low)) * (sum_[low + 1] - sum_[low]);

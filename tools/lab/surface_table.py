@@ -71,7 +71,7 @@ def measure(out, name, kernel, seed, iterations):
                       "--bounds", scene["bounds"], "--texture", "none", "--reference",
                       str(out / f"{name}_truth/surface.ply"), "--thresholds", ",".join(map(str, scene["thresholds"])),
                       "--json", str(out / "mesh.json"), "-q", "--force")
-    return {"scene": name, "kernel": kernel, "seed": seed, "iterations": iterations, "psnr": metrics["psnr"],
+    return {"scene": name, "kernel": kernel, "seed": seed, "iterations": iterations, "psnr": metrics["evaluations"][-1]["psnr_db"],
             "splats": metrics["splats"], "training_cpu_s": round(training, 1), "meshing_cpu_s": round(meshing, 1),
             "depths": json.loads(depths), "mesh": json.loads((out / "mesh.json").read_text())}
 

@@ -174,8 +174,7 @@ std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& vi
     return photos;
 }
 
-std::vector<ImageF> take_depths(const World& world, const std::vector<View>& views,
-                                double reach) {
+std::vector<ImageF> take_depths(const World& world, const std::vector<View>& views, double reach) {
     std::vector<ImageF> depths;
     for (const View& view : views) {
         ImageF& depth = depths.emplace_back(view.camera.width, view.camera.height, 1);
