@@ -69,8 +69,10 @@ void add_splat(const SplatModel& model, std::size_t splat, VoxelGrid& grid) {
         glm::transpose(grid.axes) * glm::mat3_cast(glm::normalize(turn));  // in the grid's frame
     dvec3 deviation(1.0), half(0.0);
     for (int k = 0; k < 3; ++k) {
-        deviation[k] = std::exp(double{model.log_scale[3 * splat + std::size_t(k)]}) *
-                       std::sqrt(profile.covariance);
+        // A flat splat between the middles of cells would leave a hole in a wall of such splats.
+        deviation[k] = std::max(std::exp(double{model.log_scale[3 * splat + std::size_t(k)]}) *
+                                    std::sqrt(profile.covariance),
+                                grid.cell / 2);
         half += axes[k] * axes[k] * (deviation[k] * deviation[k]);
     }
     half = glm::sqrt(half * profile.reach);

@@ -16,6 +16,7 @@
 #include "engine/mesh/mesh_file.h"
 #include "engine/mesh/texture.h"
 #include "engine/raster/frame_view.h"
+#include "engine/scene/subject.h"
 
 namespace darb {
 
@@ -255,6 +256,18 @@ std::optional<MeshTexturing> mesh_texturing_from_name(std::string_view name) {
     for (std::size_t i = 0; i < std::size(kMeshTexturings); ++i)
         if (name == kMeshTexturings[i]) return static_cast<MeshTexturing>(i);
     return std::nullopt;
+}
+
+std::vector<View> mesh_views_around(const SplatModel& model) {
+    constexpr int kViews = 32, kWidth = 960, kHeight = 720;
+    std::vector<View> views;
+    for (const Camera& camera : orbit_cameras(model, kViews, kWidth, kHeight)) {
+        View view;
+        view.name = fmt::format("around_{:02}", views.size());
+        view.camera = camera;
+        views.push_back(view);
+    }
+    return views;
 }
 
 SceneMesh mesh_scene(Device& device, SplatModel model, std::vector<View> views,

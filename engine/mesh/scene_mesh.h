@@ -79,6 +79,9 @@ struct SceneMesh {
     SceneMeshReport report;
 };
 
+/// 32 cameras around a scene that has none of its own, 960x720 px.
+std::vector<View> mesh_views_around(const SplatModel& model);
+
 /// views: their cameras count, at their sizes, without lenses. photos: null unless the texture is
 /// painted with them. Throws Error where no surface is seen or nothing of it is left.
 SceneMesh mesh_scene(Device& device, SplatModel model, std::vector<View> views,

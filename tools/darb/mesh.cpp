@@ -41,7 +41,6 @@ namespace darb {
 
 namespace {
 
-constexpr int kOrbitViews = 32, kOrbitWidth = 960, kOrbitHeight = 720;
 constexpr double kWorkingShare = 0.85;  // of --max-memory for a range of blocks
 constexpr double kManyThin = 0.01;      // of the blocks with a surface: worth a note
 
@@ -98,16 +97,11 @@ std::vector<View> known_views(const MeshFlags& flags) {
 std::vector<View> chosen_views(const MeshFlags& flags, const SplatModel& model) {
     std::vector<View> views = known_views(flags);
     if (!views.empty()) return views;
+    views = mesh_views_around(model);
     say_note(
         fmt::format("cameras: {} around the scene, as none are named; a room needs those of "
                     "its photos (--cameras)",
-                    kOrbitViews));
-    for (const Camera& camera : orbit_cameras(model, kOrbitViews, kOrbitWidth, kOrbitHeight)) {
-        View view;
-        view.name = fmt::format("around_{:02}", views.size());
-        view.camera = camera;
-        views.push_back(view);
-    }
+                    views.size()));
     return views;
 }
 
