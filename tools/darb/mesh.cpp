@@ -306,6 +306,15 @@ MeshProgress stoppable_progress(const std::atomic<bool>& stop) {
     };
 }
 
+void note_faces_left(std::size_t faces, std::size_t asked) {
+    constexpr double kNear = 1.05;
+    if (asked == 0 || double(faces) <= kNear * double(asked)) return;
+    say_note(fmt::format(
+        "{} faces are left where {} were asked for, as vertices on rims stay; fewer small parts "
+        "(--min-island, --keep) and closed holes (--fill-holes) have shorter rims",
+        faces, asked));
+}
+
 void note_thin_parts(double thin_share) {
     if (thin_share < kManyThin) return;
     say_note(fmt::format(
@@ -334,6 +343,7 @@ MeshResult make_surface(const MeshFlags& flags, const MeshProgress& progress) {
     SceneMesh made =
         mesh_scene(device, model, views, f.mesh, photos ? &*photos : nullptr, progress);
     note_thin_parts(made.report.thin_share);
+    note_faces_left(made.mesh.face_count(), f.mesh.faces);
     MeshResult result{{}, {}, report_json(f, made), report_text(f, made)};
     if (!f.reference.path.empty()) {
         progress("comparison", 0);

@@ -45,6 +45,7 @@ void expect_back(const Alignment& away, AlignKind kind) {
 
 TEST(AlignToMesh, rigid_turns_and_moves_back) {
     expect_back(displaced(12, dvec3(0.1, -0.05, 0.2), 1), AlignKind::rigid);
+    expect_back(displaced(30, dvec3(0.1, 0, 0), 1), AlignKind::rigid);
     // About the world's origin, a thousand units away: far off until the middles meet.
     expect_back(displaced(3, dvec3(5, 6, 7), 1), AlignKind::rigid);
 }
