@@ -20,6 +20,7 @@
 #include "engine/raster/forward_options.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
+#include "engine/scene/subject.h"
 #include "viewer/controls.h"
 
 namespace darb {

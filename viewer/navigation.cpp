@@ -121,16 +121,6 @@ Camera Navigation::camera(int width_px, int height_px) const {
     return c;
 }
 
-glm::dvec3 up_from_name(const std::string& name) {
-    const bool negative = name.starts_with('-');
-    const std::string axis = name.substr(negative || name.starts_with('+') ? 1 : 0);
-    const int i = axis == "x" ? 0 : axis == "y" ? 1 : axis == "z" ? 2 : -1;
-    if (i < 0) throw Error("--up", "'" + name + "' is no axis", "Use x, -x, y, -y, z or -z.");
-    glm::dvec3 up(0.0);
-    up[i] = negative ? -1 : 1;
-    return up;
-}
-
 glm::dmat3 turn_to_up(const glm::dvec3& up) {
     const glm::dvec3 to(0, -1, 0);
     glm::dvec3 axis = glm::cross(up, to);

@@ -57,8 +57,6 @@ struct Navigation {
     void turn(double to_right, double to_down);
 };
 
-/// The unit vector for x, -x, y, -y, z or -z. Throws Error for other names.
-glm::dvec3 up_from_name(const std::string& name);
 /// The shortest turn of the world that takes `up`, a unit vector, to -y.
 glm::dmat3 turn_to_up(const glm::dvec3& up);
 /// The name of the axis nearest to a direction.

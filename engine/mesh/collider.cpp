@@ -69,8 +69,10 @@ void add_splat(const SplatModel& model, std::size_t splat, VoxelGrid& grid) {
         glm::transpose(grid.axes) * glm::mat3_cast(glm::normalize(turn));  // in the grid's frame
     dvec3 deviation(1.0), half(0.0);
     for (int k = 0; k < 3; ++k) {
-        deviation[k] = std::exp(double{model.log_scale[3 * splat + std::size_t(k)]}) *
-                       std::sqrt(profile.covariance);
+        // A flat splat between the middles of cells would leave a hole in a wall of such splats.
+        deviation[k] = std::max(std::exp(double{model.log_scale[3 * splat + std::size_t(k)]}) *
+                                    std::sqrt(profile.covariance),
+                                grid.cell / 2);
         half += axes[k] * axes[k] * (deviation[k] * deviation[k]);
     }
     half = glm::sqrt(half * profile.reach);
@@ -369,11 +371,12 @@ VoxelGrid make_grid(const glm::dmat3& axes, const dvec3& low, const dvec3& high,
     DARB_CHECK(cell > 0, "{}", cell);
     const dvec3 count = glm::max(glm::ceil((high - low) / cell - 1e-9), dvec3(1.0));
     if (const double cells = count.x * count.y * count.z; !(cells <= kMostCells))
-        throw Error("collider",
-                    fmt::format("the grid would have {:.3g} cells of {:.3g}, and may have {:.3g}",
-                                cells, cell, kMostCells),
-                    fmt::format("Take cells of at least {:.3g}, or a smaller box.",
-                                1.01 * cell * std::cbrt(cells / kMostCells)));
+        throw Error(
+            "collider",
+            fmt::format("the grid would have {:.3g} cells of {:.3g}, and may have {:.3g}", cells,
+                        cell, kMostCells),
+            fmt::format("Take cells of at least {:.3g} (--voxel), or a smaller box (--bounds).",
+                        1.01 * cell * std::cbrt(cells / kMostCells)));
     VoxelGrid grid{axes, low, cell, ivec3(count), {}};
     grid.full.assign(std::size_t(count.x) * std::size_t(count.y) * std::size_t(count.z), 0.0f);
     return grid;
@@ -418,7 +421,7 @@ TriangleMesh make_collider(const VoxelGrid& grid, const std::vector<dvec3>& came
             fmt::format("there is no surface: no cell of {:.3g} is solid from {} on, or all "
                         "are",
                         grid.cell, options.level),
-            "Take smaller cells, or another box.");
+            "Take smaller cells (--voxel), or another box (--bounds).");
     for (std::size_t faces = options.faces;; faces *= 2) {
         const TriangleMesh mesh = simplify_mesh(full, faces).mesh;
         const bool clear = std::none_of(cameras.begin(), cameras.end(), [&](const dvec3& camera) {

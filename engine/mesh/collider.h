@@ -49,8 +49,8 @@ VoxelGrid make_grid(const glm::dmat3& axes, const glm::dvec3& low, const glm::dv
 void fill_grid(const std::function<double(const glm::dvec3& point)>& density, VoxelGrid& grid);
 
 /// Fills a grid with 1 - product over the splats of (1 - opacity f(q3)), q3 the squared Mahalanobis
-/// distance in space and f the kernel's profile. A splat that is smaller than a cell counts where
-/// its centre is, at least.
+/// distance in space and f the kernel's profile. No deviation counts as less than half a cell, so
+/// that walls of flat splats have no holes, and a splat counts where its centre is, at least.
 void fill_grid(const SplatModel& splats, VoxelGrid& grid);
 
 enum class ColliderKind {

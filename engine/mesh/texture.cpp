@@ -181,7 +181,7 @@ class ChartMaker {
         throw Error("texture",
                     fmt::format("face {} is {} x {} texels, and a page has {}", face, extent.x,
                                 extent.y, options_.page_side),
-                    fmt::format("Take texels of at least {:.3g}, or keep more faces.",
+                    fmt::format("Take texels of at least {:.3g} (--texel), or keep more faces.",
                                 1.01 * more * options_.texel));
     }
 
@@ -549,7 +549,7 @@ MeshTexture unwrap_mesh(const TriangleMesh& mesh, const AtlasOptions& options) {
         throw Error("texture",
                     fmt::format("needs {} pages of {} px, and may have {}", pages.size(),
                                 options.page_side, options.most_pages),
-                    fmt::format("Take texels of at least {:.3g}.",
+                    fmt::format("Take texels of at least {:.3g} (--texel).",
                                 1.05 * options.texel *
                                     std::sqrt(static_cast<double>(pages.size()) /
                                               static_cast<double>(options.most_pages))));

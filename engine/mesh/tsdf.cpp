@@ -567,24 +567,25 @@ void set_normals(TriangleMesh& mesh) {
     }
 }
 
-void bake_colours(Device& device, const std::vector<DepthView>& views, TriangleMesh& mesh,
-                  double voxel, std::uint64_t working_bytes, const MeshProgress& progress) {
-    constexpr std::uint64_t kVertexBytes = sizeof(glm::vec3) + sizeof(glm::vec4);
+std::vector<glm::u8vec3> colours_at(Device& device, const std::vector<DepthView>& views,
+                                    const glm::dvec3& origin, const std::vector<glm::vec3>& points,
+                                    double voxel, std::uint64_t working_bytes,
+                                    const MeshProgress& progress) {
+    constexpr std::uint64_t kPointBytes = sizeof(glm::vec3) + sizeof(glm::vec4);
     const std::uint64_t binding = device.info().max_storage_buffer_bytes;
     const std::uint64_t chunk = std::max<std::uint64_t>(
-        std::min({working_bytes / 2 / kVertexBytes, binding / sizeof(glm::vec4),
-                  std::uint64_t{mesh.vertex_count()}}),
+        std::min({working_bytes / 2 / kPointBytes, binding / sizeof(glm::vec4),
+                  std::uint64_t{points.size()}}),
         1);
-    const glm::dvec3 origin(mesh.origin[0], mesh.origin[1], mesh.origin[2]);
     ViewBatch batch(device, views, origin, std::min(working_bytes / 2, binding) / 8, true);
     const Pipeline bake(device, "bake", {{"THREADS", static_cast<std::int32_t>(MESH_GROUP)}});
     Buffer vertices(device, "vertices", chunk * sizeof(glm::vec3), Memory::device, "bake");
     const Buffer sums(device, "colour sums", chunk * sizeof(glm::vec4), Memory::device, "bake");
     Commands commands(device);
-    mesh.colour.clear();
-    for (std::size_t first = 0; first < mesh.vertex_count(); first += chunk) {
-        const std::size_t count = std::min<std::size_t>(chunk, mesh.vertex_count() - first);
-        const auto from = mesh.position.begin() + static_cast<std::ptrdiff_t>(first);
+    std::vector<glm::u8vec3> colours;
+    for (std::size_t first = 0; first < points.size(); first += chunk) {
+        const std::size_t count = std::min<std::size_t>(chunk, points.size() - first);
+        const auto from = points.begin() + static_cast<std::ptrdiff_t>(first);
         vertices.upload(std::vector(from, from + static_cast<std::ptrdiff_t>(count)));
         commands.begin();
         commands.fill(sums, 0);
@@ -605,9 +606,16 @@ void bake_colours(Device& device, const std::vector<DepthView>& views, TriangleM
         }
         for (const glm::vec4& sum : sums.download<glm::vec4>(count)) {
             const glm::vec3 mean = sum.w > 0 ? glm::vec3(sum) / sum.w : glm::vec3(0.5f);
-            mesh.colour.emplace_back(glm::clamp(mean, 0.0f, 1.0f) * 255.0f + 0.5f);
+            colours.emplace_back(glm::clamp(mean, 0.0f, 1.0f) * 255.0f + 0.5f);
         }
     }
+    return colours;
+}
+
+void bake_colours(Device& device, const std::vector<DepthView>& views, TriangleMesh& mesh,
+                  double voxel, std::uint64_t working_bytes, const MeshProgress& progress) {
+    const glm::dvec3 origin(mesh.origin[0], mesh.origin[1], mesh.origin[2]);
+    mesh.colour = colours_at(device, views, origin, mesh.position, voxel, working_bytes, progress);
 }
 
 }  // namespace darb

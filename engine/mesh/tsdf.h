@@ -73,8 +73,15 @@ TriangleMesh fuse_depths(Device& device, const std::vector<DepthView>& views,
 /// Unit normals of the vertices: the mean of those of their faces, by area.
 void set_normals(TriangleMesh& mesh);
 
-/// Colours of the vertices from the views' pictures. voxel: as in the report; a vertex is on the
-/// surface of a view that is within two of it. working_bytes: as above.
+/// Colours of points from the views' pictures. origin: of the points, in the world. voxel: as in
+/// the report; a point is on the surface of a view that is within two of it. working_bytes: as
+/// above.
+std::vector<glm::u8vec3> colours_at(Device& device, const std::vector<DepthView>& views,
+                                    const glm::dvec3& origin, const std::vector<glm::vec3>& points,
+                                    double voxel, std::uint64_t working_bytes,
+                                    const MeshProgress& progress = {});
+
+/// Those of the vertices.
 void bake_colours(Device& device, const std::vector<DepthView>& views, TriangleMesh& mesh,
                   double voxel, std::uint64_t working_bytes, const MeshProgress& progress = {});
 

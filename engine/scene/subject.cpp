@@ -298,6 +298,16 @@ double pivot_depth(const Subject& subject, const SplatModel& model, const Camera
     return seen ? *seen : ahead > kAhead * subject.radius ? ahead : subject.radius;
 }
 
+glm::dvec3 up_from_name(const std::string& name) {
+    const bool negative = name.starts_with('-');
+    const std::string axis = name.substr(negative || name.starts_with('+') ? 1 : 0);
+    const int i = axis == "x" ? 0 : axis == "y" ? 1 : axis == "z" ? 2 : -1;
+    if (i < 0) throw Error("--up", "'" + name + "' is no axis", "Use x, -x, y, -y, z or -z.");
+    glm::dvec3 up(0.0);
+    up[i] = negative ? -1 : 1;
+    return up;
+}
+
 std::optional<glm::dvec3> up_of_cameras(std::span<const Camera> cameras) {
     constexpr double kSure = 0.1;
     glm::dvec3 up(0.0), back(0.0);

@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/scene/camera.h"
@@ -56,6 +57,9 @@ std::optional<double> seen_depth(const SplatModel& model, const Camera& camera);
 /// or, where these cancel out, as in a map flown to and fro, opposite to their mean viewing
 /// direction. Nothing where neither tells.
 std::optional<glm::dvec3> up_of_cameras(std::span<const Camera> cameras);
+
+/// The unit vector for x, -x, y, -y, z or -z. Throws Error for other names.
+glm::dvec3 up_from_name(const std::string& name);
 
 // For scenes without cameras: which way is up, and from which side to look.
 

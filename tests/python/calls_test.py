@@ -346,6 +346,91 @@ class Kernels(unittest.TestCase):
             darb.Kernel(fails, 9)
 
 
+class Meshes(unittest.TestCase):
+    """Scene.mesh, on a ball of flat splats that cameras look at from all sides."""
+
+    COUNT = 1500
+
+    @classmethod
+    def setUpClass(cls):
+        y = 1 - (2 * np.arange(cls.COUNT) + 1) / cls.COUNT
+        a, r = 2.39996323 * np.arange(cls.COUNT), np.sqrt(1 - y * y)
+        p = np.stack([r * np.cos(a), y, r * np.sin(a)], 1).astype(np.float32)
+        length = np.sqrt(2 * (1 + p[:, 2]))
+        quats = np.stack([(1 + p[:, 2]) / length, -p[:, 1] / length, p[:, 0] / length,
+                          0 * length], 1).astype(np.float32)
+        scales = np.tile(np.float32([0.05, 0.05, 0.002]), (cls.COUNT, 1))
+        cls.scene = darb.Scene.from_arrays(p, quats, scales, np.full(cls.COUNT, 0.99, np.float32),
+                                           sh=p[:, None, :])
+        views = []
+        for i in range(14):
+            h = 1 - (2 * i + 1) / 14
+            forward = -np.array([np.sqrt(1 - h * h) * np.cos(2.39996323 * i), h,
+                                 np.sqrt(1 - h * h) * np.sin(2.39996323 * i)])
+            right = np.cross([0.1, 1, 0.05], forward)
+            right /= np.linalg.norm(right)
+            view = np.eye(4)
+            view[:3, :3] = [right, np.cross(forward, right), forward]
+            view[2, 3] = 3.4
+            views.append(view)
+        K = np.array([[110.0, 0, 48], [0, 110, 48], [0, 0, 1]])
+        cls.cameras = {"viewmats": np.array(views), "Ks": np.repeat(K[None], 14, 0), "width": 96,
+                       "height": 96}
+
+    def test_is_the_ball_and_has_its_colours(self):
+        vertices, faces, colours, info = self.scene.mesh(**self.cameras, voxel=0.1, fill_holes=2)
+        self.assertEqual(vertices.dtype, np.float64)
+        self.assertEqual(faces.dtype, np.uint32)
+        self.assertEqual(colours.shape, vertices.shape)
+        self.assertEqual(len(faces), 2 * len(vertices) - 4, "closed")
+        self.assertLess(np.abs(np.linalg.norm(vertices, axis=1) - 1).max(), 0.1)
+        corners = vertices[faces]
+        outwards = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        self.assertGreater(((outwards * corners[:, 0]).sum(1) > 0).mean(), 0.99)
+        expected = 255 * np.clip(0.5 + 0.2820948 * vertices, 0, 1)
+        self.assertLess(np.median(np.abs(colours - expected)), 6)
+        self.assertEqual((info["voxel"], info["views"]), (0.1, 14))
+        self.assertEqual(info["normals"].shape, vertices.shape)
+
+    def test_has_pages_or_no_colours_as_asked(self):
+        _, faces, colours, info = self.scene.mesh(**self.cameras, voxel=0.1, texture="splats")
+        self.assertIsNone(colours)
+        self.assertEqual(info["uv"].shape, (len(faces), 3, 2))
+        self.assertEqual(info["page"].max(), len(info["pages"]) - 1)
+        self.assertTrue(0 <= info["uv"].min() and info["uv"].max() <= 1)
+        _, few, colours, _ = self.scene.mesh(**self.cameras, voxel=0.1, texture="none",
+                                             bounds=(0, -2, -2, 2, 2, 2))
+        self.assertIsNone(colours)
+        self.assertLess(len(few), 0.6 * len(faces))
+
+    def test_a_collider_is_closed_and_a_file_is_a_reference(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "ball.obj"
+            vertices, faces, _, info = self.scene.mesh(collider="object", voxel=0.05, faces=600,
+                                                       output=path)
+            self.assertTrue(info["closed"])
+            self.assertLessEqual(len(faces), 600)
+            _, _, _, info = self.scene.mesh(**self.cameras, voxel=0.1, texture="none",
+                                            reference=path, align="similarity", thresholds=[0.1])
+            self.assertEqual(info["alignment"].shape, (4, 4))
+            self.assertLess(info["comparison"]["chamfer"], 0.05)
+            self.assertGreater(info["comparison"]["f_scores"][0][3], 0.95)
+
+    def test_what_is_wrong_is_told(self):
+        for options, said in (({"depth": "deep"}, "no such reading"),
+                              ({"texture": "photos"}, "there are no photos"),
+                              ({"bounds": (1, 1, 1, 0, 2, 2)}, "hold nothing"),
+                              ({"bounds": (1, 2, 3)}, "has 3 numbers"),
+                              ({"align": "rigid"}, "without a reference"),
+                              ({"collider": "cave"}, "no such kind"),
+                              ({"collider": "room"}, "a place within it"),
+                              ({"output": "ball.stl"}, "no ending of a mesh"),
+                              ({"viewmats": self.cameras["viewmats"]}, "is missing beside"),
+                              ({"cameras": "nowhere"}, "nowhere")):
+            with self.assertRaisesRegex(darb.Error, said):
+                self.scene.mesh(**options)
+
+
 class Refused(unittest.TestCase):
     """Every mistake is an exception that names the argument and the reason."""
 

@@ -1,37 +1,39 @@
 // SPDX-License-Identifier: MIT
-// darb mesh SCENE -o FILE: a surface out of the splats, as a triangle mesh.
+// darb mesh SCENE -o FILE: a surface out of the splats, as a triangle mesh, with colours or a
+// texture; or a collider.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/json_text.h"
 #include "engine/core/say.h"
 #include "engine/core/system.h"
 #include "engine/core/text.h"
 #include "engine/data/camera_list.h"
 #include "engine/gpu/device.h"
-#include "engine/mesh/clean.h"
-#include "engine/mesh/compare.h"
 #include "engine/mesh/mesh_file.h"
-#include "engine/mesh/opacity.h"
-#include "engine/mesh/tsdf.h"
-#include "engine/plan/effect_plan.h"
+#include "engine/mesh/scene_mesh.h"
+#include "engine/mesh/topology.h"
 #include "engine/scene/subject.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
+#include "trainer/job/request.h"
 #include "trainer/job/scene_file.h"
 #include "trainer/options/memory_size.h"
 
@@ -39,22 +41,16 @@ namespace darb {
 
 namespace {
 
-constexpr int kOrbitViews = 32, kOrbitWidth = 960, kOrbitHeight = 720;
-constexpr double kIslandExtent = 10;    // voxels
-constexpr double kFarOff = 1000;        // voxels: no reference of this scene
-constexpr double kLeftOut = 20;         // thresholds, the least one: not part of the mean distance
 constexpr double kWorkingShare = 0.85;  // of --max-memory for a range of blocks
+constexpr double kManyThin = 0.01;      // of the blocks with a surface: worth a note
 
 struct MeshFlags {
-    std::filesystem::path scene, cameras, output, json, reference;
-    std::vector<double> thresholds;  // world units; none: 1, 2 and 4 voxels
+    std::filesystem::path scene, cameras, output, json;
     std::string method = "tsdf", reading = "front", bounds, max_memory, texture = "vertex", device;
-    std::string effects = "auto";
-    float level = 0.5f, near_plane = static_cast<float>(NEAR_DEFAULT);
-    double fill_holes = 0;
-    std::size_t faces = 0, keep = 0, min_island = 50;
+    std::string effects = "auto", collider, capsule, up, align;
     bool force = false, quiet = false;
-    TsdfOptions tsdf;
+    SceneMeshOptions mesh;
+    ReferenceOptions reference;
     DatasetOptions data;
     KernelFlags kernel;
     StoredUnits units;
@@ -64,14 +60,12 @@ struct MeshFlags {
 /// Thrown by the progress of the work once a signal asked it to end; no Error, as nothing is wrong.
 struct MeshStopped {};
 
-/// What the work found, for the report.
-struct MeshReport {
-    ConfirmedDepths depths;
-    TsdfReport tsdf;
-    CleanReport clean;
-    std::optional<double> simplified_by;  // largest distance of the full mesh, world units
-    std::size_t views = 0, raw_faces = 0;
-    std::optional<MeshComparison> comparison;
+/// What is written, and what is said of it.
+struct MeshResult {
+    TriangleMesh mesh;
+    std::optional<MeshTexture> texture;
+    nlohmann::json report;
+    std::string text;  // for people
 };
 
 WorldBox box_from(const std::string& text, const glm::dvec3& origin) {
@@ -92,144 +86,84 @@ std::uint64_t budget_from(const std::string& text) {
     return static_cast<std::uint64_t>(*bytes);
 }
 
-std::vector<View> chosen_views(const MeshFlags& flags, const SplatModel& model) {
+/// Those that are named, else those of the scene's run; none where it has none.
+std::vector<View> known_views(const MeshFlags& flags) {
     if (!flags.cameras.empty()) return open_cameras(flags.cameras, flags.data);
     std::vector<View> views = cameras_beside(flags.scene);
-    if (!views.empty()) {
-        say_note(fmt::format("cameras: the {} of the scene's run", views.size()));
-        return views;
-    }
-    say_note(
-        fmt::format("cameras: {} around the scene, as none are named; a room needs those of "
-                    "its photos (--cameras)",
-                    kOrbitViews));
-    for (const Camera& camera : orbit_cameras(model, kOrbitViews, kOrbitWidth, kOrbitHeight)) {
-        View view;
-        view.name = fmt::format("around_{:02}", views.size());
-        view.camera = camera;
-        views.push_back(view);
-    }
+    if (!views.empty()) say_note(fmt::format("cameras: the {} of the scene's run", views.size()));
     return views;
 }
 
-/// What the views see of the scene.
-struct Seen {
-    std::vector<DepthView> views;
-    DepthViewOptions options;
-    std::unique_ptr<Renderer> renderer;  // for --method opacity; else what it holds is gone
-};
-
-/// Depths of all views, confirmed.
-Seen seen_surfaces(Device& device, SplatModel model, std::vector<View> views,
-                   const MeshFlags& flags, const EffectChoice& choice, const MeshProgress& progress,
-                   MeshReport& report) {
-    for (View& view : views) view.camera.lens = {};
-    EffectPlan plan = plan_rendering(model, views, {.near_plane = flags.near_plane}, choice);
-    apply_plan(plan, model);
-    ProjectionEffects effects = plan.projection();
-    effects.off_centre = true;  // a surface lies where the camera says, not where it nearly does
-    for (const View& view : views)
-        check_frame(device, view.camera.width, view.camera.height, view.name);
-    Seen seen;
-    seen.options = {*depth_reading_from_name(flags.reading), flags.level, flags.near_plane,
-                    flags.texture == "vertex"};
-    seen.renderer =
-        std::make_unique<Renderer>(device, model, Accuracy{}, effects, plan.huge_splat_path());
-    seen.views = render_depth_views(*seen.renderer, cameras_of(views), seen.options, progress);
-    if (flags.method == "tsdf") seen.renderer.reset();
-    report.views = seen.views.size();
-    report.depths = keep_confirmed(device, seen.views, model.origin, progress);
-    return seen;
+std::vector<View> chosen_views(const MeshFlags& flags, const SplatModel& model) {
+    std::vector<View> views = known_views(flags);
+    if (!views.empty()) return views;
+    views = mesh_views_around(model);
+    say_note(
+        fmt::format("cameras: {} around the scene, as none are named; a room needs those of "
+                    "its photos (--cameras)",
+                    views.size()));
+    return views;
 }
 
-TriangleMesh surface_of(Device& device, Seen& seen, const glm::dvec3& origin, TsdfOptions options,
-                        TsdfReport& report, const MeshProgress& progress) {
-    if (!seen.renderer) return fuse_depths(device, seen.views, origin, options, report, progress);
-    if (device.memory_budget() > 0)
-        options.working_bytes -= std::min(options.working_bytes / 2, device.allocated_bytes());
-    OpacityField field(*seen.renderer, seen.views, origin, seen.options, options.working_bytes / 4);
-    options.working_bytes -= options.working_bytes / 4;
-    TriangleMesh mesh =
-        opacity_surface(device, field, seen.views, origin, options, report, progress);
-    seen.renderer.reset();
-    return mesh;
+// Photos.
+
+/// The folder of the run that the scene is of; empty where there is none.
+std::filesystem::path run_of(const MeshFlags& flags) {
+    return log_of_run(flags.scene).parent_path();
 }
 
-/// Whether some camera sees what is behind the point: there is no surface there.
-bool is_looked_through(const std::vector<DepthView>& views, const glm::dvec3& p, double slack) {
-    for (const DepthView& view : views) {
-        const Camera& c = view.camera;
-        const glm::dvec3 q = c.rotation * p + c.translation;
-        const double x = c.fx * q.x / q.z + c.cx, y = c.fy * q.y / q.z + c.cy;
-        if (!(q.z > 0) || x < 0 || y < 0 || x >= c.width || y >= c.height) continue;
-        if (view.depth[std::size_t(y) * c.width + std::size_t(x)] > q.z + slack) return true;
-    }
-    return false;
+/// The data set that is named, else the one that the scene's run was trained on; empty for none.
+std::filesystem::path data_set_of(const MeshFlags& flags) {
+    if (!flags.cameras.empty()) return flags.cameras;
+    const std::filesystem::path run = run_of(flags);
+    if (run.empty() || !std::filesystem::exists(run / kRequestFile)) return {};
+    return read_request(run).dataset;
 }
 
-void clean(const MeshFlags& flags, const std::vector<DepthView>& views, const glm::dvec3& origin,
-           TriangleMesh& mesh, MeshReport& report) {
-    CleanOptions options;
-    options.keep = flags.keep;
-    options.min_faces = flags.min_island;
-    options.min_extent = flags.min_island > 0 ? kIslandExtent * report.tsdf.voxel : 0;
-    options.longest_rim = flags.fill_holes;
-    options.may_fill = [&](std::span<const std::array<glm::vec3, 3>> triangles) {
-        for (const auto& t : triangles) {
-            const glm::dvec3 middle = glm::dvec3(t[0] + t[1] + t[2]) / 3.0 + origin;
-            if (is_looked_through(views, middle, 2 * report.tsdf.voxel)) return false;
+std::map<std::string, std::array<float, 12>> exposures_of(const std::filesystem::path& run) {
+    const std::filesystem::path file = run / "exposure.json";
+    std::map<std::string, std::array<float, 12>> maps;
+    if (run.empty() || !std::filesystem::exists(file)) return maps;
+    constexpr const char* kHint = "Train again, or remove the file.";
+    const nlohmann::json all = parse_json_text(read_text_file(file), file.string(), kHint);
+    try {
+        for (const auto& [name, rows] : all.items()) {
+            std::array<float, 12>& map = maps[name];
+            for (std::size_t i = 0; i < map.size(); ++i)
+                map[i] = rows.at(i / 4).at(i % 4).get<float>();
         }
-        return true;
-    };
-    report.clean = clean_mesh(mesh, options);
-    if (mesh.face.empty())
-        throw Error(
-            flags.output.string(), "nothing is left of the surface after cleaning",
-            "Use a smaller --voxel, --min-island 0, or cameras that see more of the scene.");
-    if (flags.faces > 0 && flags.faces < mesh.face_count()) {
-        Simplified simplified = simplify_mesh(mesh, flags.faces);
-        mesh = std::move(simplified.mesh);
-        report.simplified_by = simplified.largest_distance;
+    } catch (const nlohmann::json::exception& error) {
+        throw Error(file.string(), json_reason(error), kHint);
     }
-    set_normals(mesh);
+    return maps;
 }
 
-/// Whether two cameras have the point in their pictures and nothing before it.
-bool is_seen_by_two(const std::vector<DepthView>& views, const glm::dvec3& p, double slack) {
-    int seen = 0;
-    for (const DepthView& view : views) {
-        const Camera& c = view.camera;
-        const glm::dvec3 q = c.rotation * p + c.translation;
-        const double x = c.fx * q.x / q.z + c.cx, y = c.fy * q.y / q.z + c.cy;
-        if (!(q.z > 0) || x < 0 || y < 0 || x >= c.width || y >= c.height) continue;
-        const double z = view.depth[std::size_t(y) * c.width + std::size_t(x)];
-        if (z > 0 && q.z > z + slack) continue;
-        if (++seen == 2) return true;
-    }
-    return false;
-}
-
-MeshComparison compare(const MeshFlags& flags, const std::vector<DepthView>& views, double voxel,
-                       const TriangleMesh& mesh) {
-    CompareOptions options;
-    options.spacing = voxel / 2;
-    options.thresholds = flags.thresholds;
-    if (options.thresholds.empty()) options.thresholds = {voxel, 2 * voxel, 4 * voxel};
-    options.left_out = kLeftOut * *std::ranges::min_element(options.thresholds);
-    options.far_off = kFarOff * voxel;
-    options.counts = [&](const glm::dvec3& p) { return is_seen_by_two(views, p, 4 * voxel); };
-    const std::string where = flags.reference.string();
-    if (has_extension(flags.reference, ".json"))
-        return compare_with_shapes(mesh, read_shapes(flags.reference), options, where);
-    std::vector<std::string> notes;
-    const TriangleMesh reference = read_mesh(flags.reference, &notes);
-    say_notes(notes);
-    return compare_meshes(mesh, reference, options, where);
+MeshPhotos photos_of(const MeshFlags& flags) {
+    constexpr const char* kHint = "Name the data set of the scene's photos with --cameras.";
+    const std::filesystem::path data_set = data_set_of(flags);
+    if (data_set.empty())
+        throw Error("--texture photos", "the scene is of no run that says where its photos are",
+                    kHint);
+    if (!std::filesystem::exists(data_set))
+        throw Error(data_set.string(), "the photos that the scene was trained on are not there",
+                    kHint);
+    DatasetOptions options = flags.data;
+    options.resolution = DatasetOptions{}.resolution;  // pages may be finer than depths
+    MeshPhotos photos;
+    photos.views = open_cameras(data_set, options);
+    std::erase_if(photos.views, [](const View& view) {
+        return view.photo.empty() || !std::filesystem::exists(view.photo);
+    });
+    if (photos.views.empty()) throw Error(data_set.string(), "has cameras without photos", kHint);
+    photos.exposures = exposures_of(run_of(flags));
+    return photos;
 }
 
 double share(std::size_t part, std::size_t whole) {
     return whole > 0 ? double(part) / double(whole) : 0;
 }
+
+// What is said of the result.
 
 nlohmann::json distances_json(const DistanceStatistics& d) {
     return {{"samples", d.samples},
@@ -257,169 +191,306 @@ nlohmann::json comparison_json(const MeshComparison& c) {
     return json;
 }
 
-void tell_comparison(std::FILE* out, const MeshComparison& c) {
-    const auto row = [&](const char* name, const char* what, const DistanceStatistics& d) {
-        tell(out, "{:<13} {:<18}  mean {:.4g}  median {:.4g}  90 % {:.4g}", name, what, d.mean,
-             d.median, d.p90);
+std::string comparison_text(const MeshComparison& c) {
+    const auto row = [](const char* name, const char* what, const DistanceStatistics& d) {
+        return fmt::format("{:<13} {:<18}  mean {:.4g}  median {:.4g}  90 % {:.4g}", name, what,
+                           d.mean, d.median, d.p90);
     };
-    row("accuracy", "mesh to reference", c.accuracy);
-    tell(out, "{}\n", std::isfinite(c.bias) ? fmt::format("  bias {:+.4g}", c.bias) : "");
-    if (c.completeness.samples > 0) {
-        row("completeness", "reference to mesh", c.completeness);
-        tell(out, "  Chamfer {:.4g} ({:.1f} % left out)\n", c.chamfer, 100 * c.left_out_share);
-    }
+    std::string text = row("accuracy", "mesh to reference", c.accuracy);
+    if (std::isfinite(c.bias)) text += fmt::format("  bias {:+.4g}", c.bias);
+    text += "\n";
+    if (c.completeness.samples > 0)
+        text += row("completeness", "reference to mesh", c.completeness) +
+                fmt::format("  Chamfer {:.4g} ({:.1f} % left out)\n", c.chamfer,
+                            100 * c.left_out_share);
     if (std::isfinite(c.normal_degrees))
-        tell(out, "normals off by {:.1f} degrees\n", c.normal_degrees);
+        text += fmt::format("normals off by {:.1f} degrees\n", c.normal_degrees);
     for (const FScore& f : c.f_scores) {
-        tell(out, "within {:.4g}: precision {:.3f}", f.threshold, f.precision);
-        if (c.completeness.samples > 0) tell(out, "  recall {:.3f}  F {:.3f}", f.recall, f.f());
-        tell(out, "\n");
+        text += fmt::format("within {:.4g}: precision {:.3f}", f.threshold, f.precision);
+        if (c.completeness.samples > 0)
+            text += fmt::format("  recall {:.3f}  F {:.3f}", f.recall, f.f());
+        text += "\n";
     }
+    return text;
 }
 
-nlohmann::json report_json(const MeshFlags& flags, const MeshReport& r, const TriangleMesh& mesh) {
+nlohmann::json alignment_json(const Alignment& a) {
+    nlohmann::json rows = nlohmann::json::array();
+    for (int r = 0; r < 3; ++r)
+        rows.push_back({a.rotation[0][r], a.rotation[1][r], a.rotation[2][r]});
+    return {
+        {"scale", a.scale},     {"rotation", rows}, {"shift", {a.shift.x, a.shift.y, a.shift.z}},
+        {"degrees", a.degrees}, {"moved", a.moved}, {"mean_before", a.before},
+        {"mean_after", a.after}};
+}
+
+std::string alignment_text(const Alignment& a) {
+    return fmt::format(
+        "aligned: the reference was turned by {:.3g} degrees, moved by {:.4g} and scaled by "
+        "{:.5g}; nine tenths of it lay {:.4g} from the mesh in the mean, and lie {:.4g} now\n",
+        a.degrees, a.moved, a.scale, a.before, a.after);
+}
+
+nlohmann::json report_json(const MeshFlags& flags, const SceneMesh& result) {
+    const SceneMeshReport& r = result.report;
     nlohmann::json json{{"output", name_in_json(flags.json, flags.output)},
-                        {"vertices", mesh.vertex_count()},
-                        {"faces", mesh.face_count()},
+                        {"vertices", result.mesh.vertex_count()},
+                        {"faces", result.mesh.face_count()},
                         {"voxel", r.tsdf.voxel},
                         {"farthest", r.tsdf.farthest},
                         {"method", flags.method},
                         {"depth", flags.reading},
-                        {"level", flags.level},
+                        {"level", flags.mesh.level},
                         {"views", r.views},
                         {"surface_share", share(r.depths.surfaces, r.depths.pixels)},
                         {"confirmed_share", share(r.depths.kept, r.depths.surfaces)},
                         {"blocks", r.tsdf.blocks},
                         {"ranges", r.tsdf.ranges},
+                        {"thin_share", r.thin_share},
                         {"raw_faces", r.raw_faces},
                         {"parts", r.clean.parts - r.clean.parts_removed},
                         {"parts_removed", r.clean.parts_removed},
                         {"holes_filled", r.clean.holes_filled},
                         {"holes_left", r.clean.holes_left}};
     if (r.simplified_by) json["simplified_by"] = *r.simplified_by;
-    if (r.comparison) json["comparison"] = comparison_json(*r.comparison);
+    if (r.texture) {
+        json["texture"] = {
+            {"of", flags.texture}, {"pages", r.texture->pages}, {"texel", r.texture->texel}};
+        if (flags.mesh.texture == MeshTexturing::photos) {
+            json["texture"]["unseen_faces"] = r.texture->unseen_faces;
+            json["texture"]["seams"] = r.texture->seams;
+        }
+    }
     return json;
 }
 
-void tell_report(std::FILE* out, const MeshReport& r, const TriangleMesh& mesh) {
-    tell(out,
-         "{} views: {:.0f} % of the pixels show a surface, other views confirm {:.0f} % of "
-         "those\n",
-         r.views, 100 * share(r.depths.surfaces, r.depths.pixels),
-         100 * share(r.depths.kept, r.depths.surfaces));
-    tell(out, "voxel {:.4g}, {} blocks of {} voxels in {} range{}, depths up to {:.4g}\n",
-         r.tsdf.voxel, r.tsdf.blocks, BLOCK_VOXELS, r.tsdf.ranges, r.tsdf.ranges == 1 ? "" : "s",
-         r.tsdf.farthest);
-    tell(out, "cleaned: {} of {} parts removed, {} holes filled\n", r.clean.parts_removed,
-         r.clean.parts, r.clean.holes_filled);
+std::string report_text(const MeshFlags& flags, const SceneMesh& result) {
+    const SceneMeshReport& r = result.report;
+    std::string text = fmt::format(
+        "{} views: {:.0f} % of the pixels show a surface, other views confirm {:.0f} % of those\n"
+        "voxel {:.4g}, {} blocks of {} voxels in {} range{}, depths up to {:.4g}\n"
+        "cleaned: {} of {} parts removed, {} holes filled\n",
+        r.views, 100 * share(r.depths.surfaces, r.depths.pixels),
+        100 * share(r.depths.kept, r.depths.surfaces), r.tsdf.voxel, r.tsdf.blocks, BLOCK_VOXELS,
+        r.tsdf.ranges, r.tsdf.ranges == 1 ? "" : "s", r.tsdf.farthest, r.clean.parts_removed,
+        r.clean.parts, r.clean.holes_filled);
     if (r.simplified_by)
-        tell(out, "simplified: the full surface is at most {:.4g} away\n", *r.simplified_by);
-    tell(out, "{} vertices, {} faces\n", mesh.vertex_count(), mesh.face_count());
-    if (r.comparison) tell_comparison(out, *r.comparison);
+        text +=
+            fmt::format("simplified: the full surface is at most {:.4g} away\n", *r.simplified_by);
+    if (r.texture)
+        text += fmt::format("texture: {} page{} with texels of {:.4g}", r.texture->pages,
+                            r.texture->pages == 1 ? "" : "s", r.texture->texel);
+    if (r.texture && flags.mesh.texture == MeshTexturing::photos)
+        text += fmt::format("; {:.1f} % of the faces are in no photo and have the splats' colours",
+                            100 * share(r.texture->unseen_faces, result.mesh.face_count()));
+    if (r.texture) text += "\n";
+    return text + fmt::format("{} vertices, {} faces\n", result.mesh.vertex_count(),
+                              result.mesh.face_count());
 }
 
-TriangleMesh make_mesh(const MeshFlags& flags, const std::atomic<bool>& stop, MeshReport& report) {
-    MeshFlags f = flags;
-    const EffectChoice choice = choose_effects(f.effects, EffectUse::pictures, f.data);
-    const SplatModel model = in_kernel(f.kernel, load_scene(f.scene, nullptr, f.units));
+// The work.
+
+SplatModel opened_scene(const MeshFlags& flags, SplatFile* facts = nullptr) {
+    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, facts, flags.units));
     if (model.size() == 0)
-        throw Error(f.scene.string(), "the scene has no splats", "Mesh one that has some.");
-    if (!f.bounds.empty()) f.tsdf.bounds = box_from(f.bounds, model.origin);
+        throw Error(flags.scene.string(), "the scene has no splats", "Mesh one that has some.");
+    return model;
+}
+
+/// Progress that ends the work once a signal asked for it, and notes what takes long.
+MeshProgress stoppable_progress(const std::atomic<bool>& stop) {
+    return [&stop, now = std::string(), notes = std::make_shared<std::optional<SlowProgress>>()](
+               const char* what, double part) mutable {
+        if (stop) throw MeshStopped{};
+        if (now != what) notes->emplace(now = what);
+        (*notes)->at(part);
+    };
+}
+
+void note_faces_left(std::size_t faces, std::size_t asked) {
+    constexpr double kNear = 1.05;
+    if (asked == 0 || double(faces) <= kNear * double(asked)) return;
+    say_note(fmt::format(
+        "{} faces are left where {} were asked for, as vertices on rims stay; fewer small parts "
+        "(--min-island, --keep) and closed holes (--fill-holes) have shorter rims",
+        faces, asked));
+}
+
+void note_thin_parts(double thin_share) {
+    if (thin_share < kManyThin) return;
+    say_note(fmt::format(
+        "{:.0f} % of the blocks with a surface lost it: seen from both sides, front and back "
+        "cancel where something is thinner than two voxels; use a smaller --voxel, or "
+        "--method opacity",
+        100 * thin_share));
+}
+
+MeshResult make_surface(const MeshFlags& flags, const MeshProgress& progress) {
+    MeshFlags f = flags;
+    f.mesh.effects = choose_effects(f.effects, EffectUse::pictures, f.data);
+    const SplatModel model = opened_scene(f);
+    f.mesh.reading = *depth_reading_from_name(f.reading);
+    f.mesh.method = *mesh_method_from_name(f.method);
+    if (!f.bounds.empty()) f.mesh.tsdf.bounds = box_from(f.bounds, model.origin);
+    std::optional<MeshPhotos> photos;
+    if (f.mesh.texture == MeshTexturing::photos) photos = photos_of(f);
     const std::vector<View> views = chosen_views(f, model);
     Device device(command_device(f.device));
     settle_tuning(device, f.tune);
     if (!f.max_memory.empty()) {
         const std::uint64_t budget = budget_from(f.max_memory);
         device.set_memory_budget(budget);
-        f.tsdf.working_bytes = static_cast<std::uint64_t>(kWorkingShare * double(budget));
+        f.mesh.tsdf.working_bytes = static_cast<std::uint64_t>(kWorkingShare * double(budget));
     }
-    std::string now;
-    std::optional<SlowProgress> notes;
-    const MeshProgress progress = [&](const char* what, double part) {
-        if (stop) throw MeshStopped{};
-        if (now != what) notes.emplace(now = what);
-        notes->at(part);
-    };
-    Seen what = seen_surfaces(device, model, views, f, choice, progress, report);
-    TriangleMesh mesh = surface_of(device, what, model.origin, f.tsdf, report.tsdf, progress);
-    const std::vector<DepthView>& seen = what.views;
-    report.raw_faces = mesh.face_count();
-    clean(f, seen, model.origin, mesh, report);
-    if (f.texture == "vertex")
-        bake_colours(device, seen, mesh, report.tsdf.voxel, f.tsdf.working_bytes, progress);
-    if (!f.reference.empty()) {
+    SceneMesh made =
+        mesh_scene(device, model, views, f.mesh, photos ? &*photos : nullptr, progress);
+    note_thin_parts(made.report.thin_share);
+    note_faces_left(made.mesh.face_count(), f.mesh.faces);
+    MeshResult result{{}, {}, report_json(f, made), report_text(f, made)};
+    if (!f.reference.path.empty()) {
         progress("comparison", 0);
-        report.comparison = compare(f, seen, report.tsdf.voxel, mesh);
+        const ReferenceComparison found = compare_with_reference(made, f.reference);
+        say_notes(found.notes);
+        result.report["comparison"] = comparison_json(found.comparison);
+        if (found.alignment) {
+            result.report["alignment"] = alignment_json(*found.alignment);
+            result.text += alignment_text(*found.alignment);
+        }
+        result.text += comparison_text(found.comparison);
     }
+    result.mesh = std::move(made.mesh);
+    result.texture = std::move(made.texture);
     progress("files", 0);
-    return mesh;
+    return result;
 }
 
-int mesh(const MeshFlags& flags) {
-    const Paths inputs =
-        together({files_of(flags.scene), files_of(flags.cameras), Paths{flags.reference}});
-    refuse_to_overwrite_inputs({flags.output, flags.json}, inputs, Replaces::all);
-    const WrittenFiles written(files_of(flags.scene), flags.force);
-    written.check({flags.output});
+glm::dvec3 up_of_scene(const MeshFlags& flags, const SplatModel& model,
+                       const std::vector<Camera>& cameras, const std::string& stated) {
+    if (!flags.up.empty()) return up_from_name(flags.up);
+    if (const auto held = up_of_cameras(cameras)) return *held;
+    return stated.empty() ? guess_up(model) : up_from_name(stated);
+}
+
+MeshResult make_collision_mesh(const MeshFlags& flags, const MeshProgress& progress) {
+    SplatFile facts;
+    const SplatModel model = opened_scene(flags, &facts);
+    const std::vector<Camera> cameras = cameras_of(known_views(flags));
+    SceneColliderOptions options;
+    options.collider.kind = *collider_kind_from_name(flags.collider);
+    options.collider.faces = flags.mesh.faces > 0 ? flags.mesh.faces : kColliderFaces;
+    if (!flags.capsule.empty()) {
+        const std::vector<double> size = numbers_from("--capsule", flags.capsule, 2);
+        options.collider.radius = size[0];
+        options.collider.height = size[1];
+        if (!(size[0] > 0 && size[1] >= 2 * size[0]))
+            throw Error("--capsule " + flags.capsule, "is not a radius and a height of twice it",
+                        "Give them in world units, as --capsule 0.2,1.6.");
+    }
+    options.cell = flags.mesh.tsdf.voxel;
+    if (!flags.bounds.empty()) options.bounds = box_from(flags.bounds, model.origin);
+    options.up = up_of_scene(flags, model, cameras, facts.up);
+    progress("cells", 0);
+    SceneCollider made = collide_scene(model, cameras, options, progress);
+    const Topology topology = topology_of(made.mesh);
+    const glm::dvec3& up = options.up;
+    MeshResult result{std::move(made.mesh), {}, {}, {}};
+    result.report = {{"output", name_in_json(flags.json, flags.output)},
+                     {"collider", flags.collider},
+                     {"vertices", topology.vertices},
+                     {"faces", topology.faces},
+                     {"parts", topology.parts},
+                     {"closed", topology.is_closed()},
+                     {"manifold", topology.is_manifold()},
+                     {"cell", made.cell},
+                     {"cells", {made.cells.x, made.cells.y, made.cells.z}},
+                     {"up", {up.x, up.y, up.z}},
+                     {"cameras", cameras.size()}};
+    result.text = fmt::format(
+        "{} x {} x {} cells of {:.4g}; up is {:.3g}, {:.3g}, {:.3g}; {} cameras stand in what is "
+        "free\ncollider: {} faces in {} part{}, {}\n",
+        made.cells.x, made.cells.y, made.cells.z, made.cell, up.x, up.y, up.z, cameras.size(),
+        topology.faces, topology.parts, topology.parts == 1 ? "" : "s",
+        topology.is_closed() && topology.is_manifold() ? "closed" : "not closed");
+    progress("files", 0);
+    return result;
+}
+
+void check_output(const MeshFlags& flags) {
     if (mesh_endings().find(flags.output.extension().string()) == std::string::npos ||
         flags.output.extension().empty())
         throw Error(flags.output.string(), "has no ending of a mesh",
                     "Use " + mesh_endings() + ".");
-    if (flags.method == "opacity" && flags.reading == "expected")
-        throw Error("--depth expected",
-                    "is a mean of depths, and says of no point what is before it",
-                    "Use --depth front, solid or plane with --method opacity.");
-    if (flags.faces > 0 && !can_simplify())
+    if (has_pages(flags.mesh.texture) && has_extension(flags.output, ".ply"))
+        throw Error(flags.output.string(), "a .ply has no place for a texture",
+                    "Write .glb, .gltf or .obj, or take --texture vertex.");
+    if (flags.mesh.faces > 0 && !can_simplify())
         throw Error("--faces", "this darb was built without meshoptimizer",
                     "Install libmeshoptimizer-dev and build it again, or leave --faces out.");
-    const std::atomic<bool>& stop = stop_on_signals();
-    MeshReport report;
-    TriangleMesh result;
+}
+
+int mesh(const MeshFlags& flags) {
+    const Paths inputs =
+        together({files_of(flags.scene), files_of(flags.cameras), Paths{flags.reference.path}});
+    refuse_to_overwrite_inputs({flags.output, flags.json}, inputs, Replaces::all);
+    const WrittenFiles written(files_of(flags.scene), flags.force);
+    written.check({flags.output});
+    check_output(flags);
+    const MeshProgress progress = stoppable_progress(stop_on_signals());
+    MeshResult result;
+    EncodedSplats encoded;
     try {
-        result = make_mesh(flags, stop, report);
+        result = flags.collider.empty() ? make_surface(flags, progress)
+                                        : make_collision_mesh(flags, progress);
+        encoded = encode_mesh(result.mesh, flags.output.string(),
+                              result.texture ? &*result.texture : nullptr);
+        progress("files", 1);
     } catch (const MeshStopped&) {
         say("stopped by {}: nothing was written\n", stop_name());
         return stop_exit_code();
     }
-    const EncodedSplats encoded = encode_mesh(result, flags.output.string());
     const Paths outputs = outputs_of(flags.output, encoded);
     written.check(outputs);
-    write_mesh(flags.output, result);
+    write_encoded(flags.output, encoded);
     written.wrote(outputs);
-    write_json(flags.json, report_json(flags, report, result));
-    tell_report(stream_beside_json(flags.json, flags.quiet), report, result);
+    write_json(flags.json, result.report);
+    tell(stream_beside_json(flags.json, flags.quiet), "{}", result.text);
     tell_paths(flags.quiet, together({outputs, {flags.json}}));
     return 0;
 }
 
-void add_surface_options(CLI::App& c, MeshFlags& flags) {
-    c.add_option("--method", flags.method,
-                 "tsdf: the mean of the views' distances; opacity: where the opacity of the space "
-                 "passes 1 - level, which keeps thin things and takes longer")
-        ->capture_default_str()
-        ->check(CLI::IsMember({"tsdf", "opacity"}));
-    c.add_option("--depth", flags.reading,
-                 "how a splat takes light along a ray: front, solid, plane, or expected, the mean "
-                 "of the centres")
-        ->capture_default_str()
-        ->check(CLI::IsMember(
-            std::vector<std::string>(std::begin(kDepthReadings), std::end(kDepthReadings))));
-    c.add_option("--level", flags.level, "share of the light that is left at the surface")
-        ->capture_default_str()
-        ->check(CLI::Range(0.01, 0.99));
-    c.add_option("--voxel", flags.tsdf.voxel, "side of a voxel, world units")
-        ->default_str("a pixel on the surface, in the median")
+/// Options that only a surface has, or only a collider.
+struct OptionGroups {
+    std::vector<CLI::Option*> surface, collider;
+};
+
+void add_surface_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
+    groups.surface.push_back(
+        c.add_option(
+             "--depth", flags.reading,
+             "how a splat takes light along a ray: front, solid, plane, or expected, the mean "
+             "of the centres")
+            ->capture_default_str()
+            ->check(CLI::IsMember(
+                std::vector<std::string>(std::begin(kDepthReadings), std::end(kDepthReadings)))));
+    groups.surface.push_back(
+        c.add_option("--level", flags.mesh.level, "share of the light that is left at the surface")
+            ->capture_default_str()
+            ->check(CLI::Range(0.01, 0.99)));
+    c.add_option("--voxel", flags.mesh.tsdf.voxel, "side of a voxel, world units")
+        ->default_str("a pixel on the surface, in the median; of a collider 1/256 of its box")
         ->check(above_zero());
-    c.add_option("--truncation", flags.tsdf.truncation,
-                 "half width of the band around a depth, voxels")
-        ->capture_default_str()
-        ->check(CLI::Range(2, 16));
-    c.add_option("--far", flags.tsdf.farthest, "largest depth that counts, world units")
-        ->default_str("4 times the median depth")
-        ->check(above_zero());
-    c.add_option("--near", flags.near_plane, "nearest distance drawn, world units")
-        ->capture_default_str()
-        ->check(above_zero());
+    groups.surface.push_back(c.add_option("--truncation", flags.mesh.tsdf.truncation,
+                                          "half width of the band around a depth, voxels")
+                                 ->capture_default_str()
+                                 ->check(CLI::Range(2, 16)));
+    groups.surface.push_back(
+        c.add_option("--far", flags.mesh.tsdf.farthest, "largest depth that counts, world units")
+            ->default_str("4 times the median depth")
+            ->check(above_zero()));
+    groups.surface.push_back(
+        c.add_option("--near", flags.mesh.near_plane, "nearest distance drawn, world units")
+            ->capture_default_str()
+            ->check(above_zero()));
     c.add_option("--bounds", flags.bounds, "X0,Y0,Z0,X1,Y1,Z1: a box that the mesh stays in")
         ->default_str("what two views see");
     c.add_option("--max-memory", flags.max_memory,
@@ -427,34 +498,73 @@ void add_surface_options(CLI::App& c, MeshFlags& flags) {
         ->default_str("none");
 }
 
-void add_cleaning_options(CLI::App& c, MeshFlags& flags) {
-    c.add_option("--faces", flags.faces, "simplify to so many faces")
-        ->default_str("off")
+void add_cleaning_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
+    c.add_option("--faces", flags.mesh.faces, "simplify to so many faces")
+        ->default_str("off; of a collider 5000")
         ->check(CLI::Range(4, 2'000'000'000));
-    c.add_option("--keep", flags.keep, "so many parts, the largest")->default_str("all");
-    c.add_option("--min-island", flags.min_island,
-                 "smallest part, faces; one of fewer, or of less than 10 voxels across, goes; 0: "
-                 "all stay")
-        ->capture_default_str();
-    c.add_option("--fill-holes", flags.fill_holes,
-                 "close holes with a shorter rim, world units, that no camera looks through")
-        ->default_str("off")
-        ->check(above_zero());
-    c.add_option("--texture", flags.texture, "vertex: a colour at each vertex; none")
-        ->capture_default_str()
-        ->check(CLI::IsMember({"none", "vertex"}));
+    groups.surface.push_back(
+        c.add_option("--keep", flags.mesh.keep, "so many parts, the largest")->default_str("all"));
+    groups.surface.push_back(
+        c.add_option(
+             "--min-island", flags.mesh.min_island,
+             "smallest part, faces; one of fewer, or of less than 10 voxels across, goes; 0: "
+             "all stay")
+            ->capture_default_str());
+    groups.surface.push_back(
+        c.add_option("--fill-holes", flags.mesh.fill_holes,
+                     "close holes with a shorter rim, world units, that no camera looks through")
+            ->default_str("off")
+            ->check(above_zero()));
+    CLI::Option* const texture =
+        c.add_option(
+             "--texture", flags.texture,
+             "vertex: a colour at each vertex; splats, photos: pages beside or within the file, "
+             "painted with the scene's own pictures or with its photos; none")
+            ->capture_default_str()
+            ->check(CLI::IsMember(
+                std::vector<std::string>(std::begin(kMeshTexturings), std::end(kMeshTexturings))));
+    groups.surface.push_back(texture);
+    groups.surface.push_back(
+        c.add_option("--texel", flags.mesh.texel, "side of a texel of the pages, world units")
+            ->default_str("half a voxel")
+            ->check(above_zero())
+            ->needs(texture));
 }
 
-void add_reference_options(CLI::App& c, MeshFlags& flags) {
+void add_reference_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
     CLI::Option* const reference = c.add_option(
-        "--reference", flags.reference,
+        "--reference", flags.reference.path,
         "compare with this: a mesh or points (" + mesh_endings() + "), or a .json of exact shapes");
-    c.add_option("--thresholds", flags.thresholds,
+    c.add_option("--thresholds", flags.reference.thresholds,
                  "distances of the F-score, world units, with commas")
         ->delimiter(',')
         ->check(above_zero())
         ->default_str("1, 2 and 4 voxels")
         ->needs(reference);
+    c.add_option("--align", flags.align,
+                 "first bring the reference to the mesh: rigid, turned and moved; similarity, "
+                 "scaled as well")
+        ->default_str("off")
+        ->check(CLI::IsMember({"rigid", "similarity"}))
+        ->needs(reference);
+    groups.surface.push_back(reference);
+}
+
+void add_collider_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
+    CLI::Option* const collider = c.add_option(
+        "--collider", flags.collider,
+        "instead make a closed mesh for programs that move bodies, of a room, a ground or an "
+        "object: cameras stand in what is free");
+    collider->check(CLI::IsMember({"room", "ground", "object"}))->default_str("off");
+    groups.collider.push_back(c.add_option("--capsule", flags.capsule,
+                                           "radius and height of who walks there, world units")
+                                  ->default_str("0.2,1.6"));
+    groups.collider.push_back(
+        c.add_option("--up", flags.up,
+                     "up axis: x, -x, y, -y, z or -z (default: as the cameras were held, else what "
+                     "the file says, else a guess)"));
+    for (CLI::Option* const option : groups.surface) option->excludes(collider);
+    for (CLI::Option* const option : groups.collider) option->needs(collider);
 }
 
 }  // namespace
@@ -474,9 +584,11 @@ void add_mesh(CLI::App& app, Action& action) {
                         "[those of the scene's run; else 32 around it]");
     command->add_option("-r,--resolution", flags->data.resolution,
                         "of a data set's cameras: 1, 2, 4, 8 or a width in px");
-    add_surface_options(*command, *flags);
-    add_cleaning_options(*command, *flags);
-    add_reference_options(*command, *flags);
+    OptionGroups groups;
+    add_surface_options(*command, *flags, groups);
+    add_cleaning_options(*command, *flags, groups);
+    add_reference_options(*command, *flags, groups);
+    add_collider_options(*command, *flags, groups);
     command->add_flag("--force", flags->force, "replace a file that darb did not write");
     add_json_option(*command, flags->json);
     add_kernel_flags(*command, flags->kernel, "draw with it in the place of the scene's own");
@@ -485,7 +597,11 @@ void add_mesh(CLI::App& app, Action& action) {
     add_tune_flags(*command, flags->tune);
     add_quiet_flag(*command, flags->quiet);
     add_unit_options(*command, flags->units);
-    command->callback([flags, &action] { action = [flags] { return mesh(*flags); }; });
+    command->callback([flags, &action] {
+        flags->mesh.texture = *mesh_texturing_from_name(flags->texture);
+        flags->reference.align = align_kind_from_name(flags->align);
+        action = [flags] { return mesh(*flags); };
+    });
 }
 
 }  // namespace darb

@@ -31,6 +31,7 @@
 #include "engine/render/renderer.h"
 #include "engine/scene/panorama.h"
 #include "engine/scene/stored_units.h"
+#include "engine/scene/subject.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/flags.h"
 #include "tools/darb/open_cameras.h"

@@ -28,6 +28,7 @@
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/scene/splat_file.h"
+#include "engine/scene/subject.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/flags.h"
 #include "tools/darb/open_cameras.h"

@@ -9,6 +9,7 @@
 #include "tools/python/dataset.h"
 #include "tools/python/device.h"
 #include "tools/python/kernel.h"
+#include "tools/python/mesh.h"
 #include "tools/python/rasterize.h"
 #include "tools/python/reference.h"
 #include "tools/python/scene.h"
@@ -118,6 +119,7 @@ PYBIND11_MODULE(_darb, module) {
     bind_kernel(module);
     bind_scene(module);
     bind_rasterize(module);
+    bind_mesh(module);
     bind_dataset(module);
     bind_trainer(module);
     bind_study(module);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/core/error.h"
+#include "engine/scene/subject.h"
 
 namespace darb {
 namespace {

@@ -175,7 +175,7 @@ std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& vi
     return photos;
 }
 
-std::vector<ImageF> take_depths(const World& world, const std::vector<View>& views) {
+std::vector<ImageF> take_depths(const World& world, const std::vector<View>& views, double reach) {
     std::vector<ImageF> depths;
     for (const View& view : views) {
         ImageF& depth = depths.emplace_back(view.camera.width, view.camera.height, 1);
@@ -183,7 +183,7 @@ std::vector<ImageF> take_depths(const World& world, const std::vector<View>& vie
             for (int x = 0; x < depth.width; ++x) {
                 const Ray ray = ray_through(view.camera, x + 0.5, y + 0.5);
                 const double t = depth_along(world, ray);
-                if (t < 0 || glm::length(ray.at(t)) > kPointReach) continue;
+                if (t < 0 || glm::length(ray.at(t)) > reach) continue;
                 const dvec3 seen = view.camera.rotation * ray.at(t) + view.camera.translation;
                 depth.at(x, y, 0) = static_cast<float>(seen.z);
             }

@@ -53,8 +53,9 @@ std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& vi
                                  std::uint64_t seed, int samples = 0);
 
 /// Their true depths along the optical axis at the centres of the pixels, world units; 0 where the
-/// ray meets nothing within the reach of points, as with a depth camera.
-std::vector<ImageF> take_depths(const World& world, const std::vector<View>& views);
+/// ray meets nothing within `reach` world units of 0, as with a depth camera.
+std::vector<ImageF> take_depths(const World& world, const std::vector<View>& views,
+                                double reach = kPointReach);
 
 /// Photos (gamma 2.2, 8 bits) and surface points, spread evenly over the pixels of the training
 /// views, with 1 mm of noise. Uses all cores; the result does not depend on their number.

@@ -5,6 +5,7 @@
 // make_scene depths FOLDER [SCALE]: also writes the true depths of all views beside the photos.
 // make_scene outdoors FOLDER [SCALE]: photos from near the ground, under clouds.
 // make_scene town FOLDER SIDE SCALE: SIDE x SIDE photos of a town of 16 blocks (town.h).
+// make_scene town-depths FOLDER SIDE SCALE: also writes the true depths of its photos.
 // make_scene surface FOLDER: what is true of the still life's surface, without photos: surface.ply,
 // points that two training photos see, and shapes.json, its shapes (surface.h).
 // make_scene town-surface FOLDER SIDE: the same of the town, by SIDE x SIDE photos.
@@ -21,10 +22,13 @@
 
 namespace {
 
-void make_town(const std::filesystem::path& folder, int side, double scale) {
+void make_town(const std::filesystem::path& folder, int side, double scale, bool depths) {
     using namespace darb::make_scene;
+    const World world = town();
     const std::vector<darb::View> views = town_flight(side, scale);
-    write_scene(folder, views, capture_views(town(), views, town_capture(views.size())));
+    const CaptureSettings settings = town_capture(views.size());
+    write_scene(folder, views, capture_views(world, views, settings));
+    if (depths) write_depths(folder, views, take_depths(world, views, settings.reach));
 }
 
 void make_still_life(const std::filesystem::path& folder, int scale, bool outdoors, bool depths) {
@@ -63,6 +67,7 @@ int usage() {
         "       make_scene depths FOLDER [SCALE]   (with the true depths of the photos)\n"
         "       make_scene outdoors FOLDER [SCALE]   (from near the ground, under clouds)\n"
         "       make_scene town FOLDER SIDE SCALE   (SIDE x SIDE photos; SCALE from 0.2)\n"
+        "       make_scene town-depths FOLDER SIDE SCALE   (with the true depths of the photos)\n"
         "       make_scene surface FOLDER   (true surfaces of the still life, no photos)\n"
         "       make_scene town-surface FOLDER SIDE   (those of the town)\n");
     return 2;
@@ -75,11 +80,14 @@ int main(int argc, char** argv) {
     const auto asks_for = [&](const char* what, int arguments) {
         return argc == arguments && std::strcmp(argv[1], what) == 0;
     };
-    const bool of_town = asks_for("town", 5) || asks_for("town-surface", 4);
+    const bool photos_of_town = asks_for("town", 5) || asks_for("town-depths", 5);
+    const bool of_town = photos_of_town || asks_for("town-surface", 4);
     const int side = of_town ? std::atoi(argv[3]) : 2;
-    const double town_scale = asks_for("town", 5) ? std::atof(argv[4]) : 1;
+    const double town_scale = photos_of_town ? std::atof(argv[4]) : 1;
     if (of_town && (side < 2 || side > 100 || town_scale < 0.2 || town_scale > 8)) return usage();
-    if (asks_for("town", 5)) return make([&] { make_town(argv[2], side, town_scale); });
+    if (photos_of_town)
+        return make(
+            [&] { make_town(argv[2], side, town_scale, std::strcmp(argv[1], "town") != 0); });
     if (asks_for("town-surface", 4))
         return make([&] { write_surface(argv[2], town(), town_flight(side, 1), kTownSurface); });
     if (asks_for("surface", 3))

@@ -201,6 +201,38 @@ def _scene_render(self, viewmats, Ks, width, height, **options):
     return rasterize(self, viewmats=viewmats, Ks=Ks, width=width, height=height, **options)
 
 
+def _scene_mesh(self, viewmats=None, Ks=None, width=None, height=None, *, cameras=None,
+                resolution=-1, depth="front", level=0.5, voxel=None, truncation=4, far=None,
+                near=0.2, bounds=None, faces=None, keep=None, min_island=50, fill_holes=None,
+                texture="vertex", texel=None, collider=None, capsule=(0.2, 1.6), up=None,
+                reference=None, thresholds=None, align=None, output=None, device=""):
+    """`darb mesh` for this scene -> (vertices, faces, colours, info).
+
+    Cameras say from where the surface is seen: viewmats and Ks as in darb.rasterize, or cameras,
+    the path of a cameras.json, a transforms.json or a data set (resolution: as -r). Without any
+    there are 32 around the scene. The other options are those of the command, by the same names
+    (docs/mesh.md); bounds is (x0, y0, z0, x1, y1, z1). output also writes a file: .ply, .obj, .glb
+    or .gltf. device: as for darb.device; a collider needs none.
+
+    vertices  [V, 3] float64, world units.
+    faces     [F, 3] uint32, counter-clockwise from outside.
+    colours   [V, 3] uint8, or None where the texture is another one than "vertex".
+    info      a dict: "voxel", "normals" [V, 3] or None, what `--json` reports, and
+              for pages "uv" [F, 3, 2], (0, 0) the top left corner; "page" [F]; "pages", a list of
+              uint8 [H, W, 3];
+              with a reference "comparison" and, where it was aligned, "alignment", the [4, 4]
+              float64 that took the reference to the mesh.
+    """
+    return _darb.mesh(
+        None if collider is not None else _device(device), self,
+        {"viewmats": viewmats, "Ks": Ks, "width": width, "height": height, "cameras": cameras,
+         "resolution": resolution, "depth": depth, "level": level, "voxel": voxel,
+         "truncation": truncation, "far": far, "near": near, "bounds": bounds, "faces": faces,
+         "keep": keep, "min_island": min_island, "fill_holes": fill_holes, "texture": texture,
+         "texel": texel, "collider": collider, "capsule": capsule, "up": up,
+         "reference": reference, "thresholds": thresholds, "align": align, "output": output})
+
+
 def _scene_picture(self, size=480):
     """A view of the scene along z, [size, size, 3] float32."""
     means = _np.asarray(self.means, dtype=_np.float64)
@@ -227,6 +259,7 @@ def _scene_repr(self):
 _scene_of_arrays = Scene.from_arrays
 Scene.from_arrays = staticmethod(_scene_from_arrays)
 Scene.render = _scene_render
+Scene.mesh = _scene_mesh
 Scene.picture = _scene_picture
 Scene._repr_png_ = _scene_png
 Scene.__repr__ = _scene_repr

@@ -87,6 +87,18 @@ class Scene:
                background: Any = None, sh_degree: Optional[int] = None, near: float = 0.2,
                accuracy: str = "balanced", depth: bool = False,
                device: DeviceLike = "") -> Tuple[Floats, Floats, Info]: ...
+    def mesh(self, viewmats: Optional[ArrayLike] = None, Ks: Optional[ArrayLike] = None,
+             width: Optional[int] = None, height: Optional[int] = None, *,
+             cameras: Optional[Path] = None, resolution: int = -1, depth: str = "front",
+             level: float = 0.5, voxel: Optional[float] = None, truncation: int = 4,
+             far: Optional[float] = None, near: float = 0.2, bounds: Optional[ArrayLike] = None,
+             faces: Optional[int] = None, keep: Optional[int] = None, min_island: int = 50,
+             fill_holes: Optional[float] = None, texture: str = "vertex",
+             texel: Optional[float] = None, collider: Optional[str] = None,
+             capsule: ArrayLike = (0.2, 1.6), up: Optional[str] = None,
+             reference: Optional[Path] = None, thresholds: Optional[ArrayLike] = None,
+             align: Optional[str] = None, output: Optional[Path] = None, device: DeviceLike = ""
+             ) -> Tuple[Doubles, Any, Optional[Bytes], dict[str, Any]]: ...
     def picture(self, size: int = 480) -> Floats: ...
     def _repr_png_(self) -> bytes: ...
     def __len__(self) -> int: ...
