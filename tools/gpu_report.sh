@@ -48,7 +48,7 @@ fi
 mkdir -p "$out" || exit 2
 out=$(cd "$out" && pwd)
 # Removes the files of an earlier report.
-for name in devices passes check bench filled growth train photos validation model; do
+for name in devices passes check bench filled forms growth train photos validation model; do
     rm -f "$out/$name.txt" "$out/$name.json"
 done
 
@@ -74,8 +74,18 @@ step devices 5 "$darb" devices "${device[@]}"
 step passes 10 "$darb" devices --passes "${device[@]}" --json "$out/passes.json"
 step check 25 "$darb" check "${device[@]}"
 step bench 15 "$darb" bench 'random_100k|sort/|scan/|tuning' "${device[@]}" --seconds 0.5 --samples 5 --json "$out/bench.json"
-step filled 5 "$darb" bench train/filled "${device[@]}" --seconds 0.5 --samples 5 --json "$out/filled.json"
-step growth 10 "$darb" bench --growth "${device[@]}" --seconds 0.2 --samples 3 --json "$out/growth.json"
+step filled 5 "$darb" bench 'train/(filled|trained)' "${device[@]}" --seconds 0.5 --samples 5 --json "$out/filled.json"
+# Every form of passes for few, large splats, on a scene that has such; the first row is the device's own choice.
+trained_forms() {
+    for forms in '' depths=four,emit=splats,tiles=rows,sums=splats depths=three emit=slots tiles=longest sums=chunks depths=three,emit=slots,tiles=longest,sums=chunks; do
+        echo "--tune ${forms:-(as measured)}"
+        DARB_TUNE=$forms "$darb" bench train/trained "${device[@]}" --seconds 0.3 --samples 5 || return
+    done
+}
+export -f trained_forms
+export darb
+step forms 8 bash -c 'device=("$@"); trained_forms' bash "${device[@]}"
+step growth 8 "$darb" bench --growth "${device[@]}" --seconds 0.2 --samples 3 --json "$out/growth.json"
 if [[ -d $here/assets/scene ]]; then
     step train 15 "$darb" train "$here/assets/scene" -o "$out/scene" "${device[@]}" --iterations 300 --eval
 fi
@@ -85,7 +95,10 @@ if compgen -G '/usr/share/vulkan/explicit_layer.d/*validation*' >/dev/null && [[
     # Messages of the layer do not end a run.
     grep -q 'vulkan.validation:' "$out/validation.txt" && sed -i 's/^validation\tok/validation\tFAILED/' "$out/steps.txt"
 fi
-if [[ -s $out/passes.json ]]; then step model 2 python3 -B "$here/tools/lab/gpu_model.py" "$out/passes.json"; fi
+if [[ -s $out/passes.json ]]; then
+    step model 2 bash -c 'python3 -B "$@" && python3 -B "$@" --trained --emit slots --sums chunks' bash \
+        "$here/tools/lab/gpu_model.py" "$out/passes.json"
+fi
 python3 -B "$here/tools/lab/gpu_report_page.py" "$out" ${photos:+"$photos"} || exit 1
 find "$out" -name 'checkpoint*' -delete
 tar -C "$(dirname "$out")" -czf "$out.tar.gz" "$(basename "$out")"

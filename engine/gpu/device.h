@@ -67,6 +67,11 @@ struct Tuning {
     std::uint32_t blend_lanes = 0;  // lanes of a subgroup in both blends; 0: the device's own
     BackwardBlend backward = BackwardBlend::subgroup;
     LossWay loss = LossWay::strips;
+    bool short_depths = false;    // depth keys of SHORT_DEPTH_BITS, sorted by three digits
+    bool emit_by_slots = false;   // a thread for each intersection: emit_slots.comp
+    bool sums_by_chunks = false;  // of the partials of large splats: partial_chunks.comp
+    bool longest_first =
+        false;  // the blends take the tiles by the lengths of their lists: tile_order.comp
     bool exp_builtin = false;  // use the driver's own exp where kernels may (kEvaluationOfDevice)
     PhotoPlace photos = PhotoPlace::automatic;
     bool operator==(const Tuning&) const = default;

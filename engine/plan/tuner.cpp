@@ -147,8 +147,12 @@ std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
         {"scatter",
          usual_first(kSortScatters, usual_tuning(info).scatter),
          {"depth sort", "tile sort"}},
+        {"depths", {"four", "three"}, {"compact", "depth sort"}},
+        {"emit", {"splats", "slots"}, {"emit"}},
+        {"tiles", {"rows", "longest"}, {"tile ranges", "blend", "blend backward"}},
         {"blend", blend_shapes(info), {"blend"}},
         {"backward", backward_blends(info), {"blend", "blend backward"}, true},
+        {"sums", {"splats", "chunks"}, {"project backward"}, true},
         {"loss", usual_first(kLossWays, usual_tuning(info).loss), {"loss"}},
         {"exp", {"polynomial", "builtin"}, {"blend", "blend backward"}, true},
         {"photos", usual_first(kPhotoPlaces, usual_tuning(info).photos), {}}};
@@ -177,8 +181,8 @@ TuningNames checkpoint_tuning(const DeviceInfo& info, std::string_view text,
 
 std::string names_text(const TuningNames& names) {
     std::string text;
-    for (const char* name :
-         {"scan", "scatter", "blend", "backward", "loss", "exp", "photos", "lanes"})
+    for (const char* name : {"scan", "scatter", "depths", "emit", "tiles", "blend", "backward",
+                             "sums", "loss", "exp", "photos", "lanes"})
         if (const auto found = names.find(name); found != names.end())
             text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, found->second);
     return text;
@@ -188,6 +192,10 @@ TuningNames tuning_names(const Tuning& tuning) {
     TuningNames names{
         {"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
         {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
+        {"depths", tuning.short_depths ? "three" : "four"},
+        {"emit", tuning.emit_by_slots ? "slots" : "splats"},
+        {"tiles", tuning.longest_first ? "longest" : "rows"},
+        {"sums", tuning.sums_by_chunks ? "chunks" : "splats"},
         {"blend", tuning.blend_records ? std::string(kRecords) : shape_name(tuning.blend_threads)},
         {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]},
         {"loss", kLossWays[static_cast<std::size_t>(tuning.loss)]},
@@ -201,6 +209,10 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
     for (const auto& [name, choice] : names) {
         if (name == "scan") tuning.scan_by_thread = choice == "thread";
         if (name == "scatter") tuning.scatter = named<SortScatter>(kSortScatters, choice);
+        if (name == "depths") tuning.short_depths = choice == "three";
+        if (name == "emit") tuning.emit_by_slots = choice == "slots";
+        if (name == "tiles") tuning.longest_first = choice == "longest";
+        if (name == "sums") tuning.sums_by_chunks = choice == "chunks";
         if (name == "blend") tuning.blend_records = choice == kRecords;
         if (name == "blend" && choice != kRecords)
             std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_threads);
@@ -219,6 +231,7 @@ Tuning resumed_tuning(const DeviceInfo& info, Tuning tuning, std::string_view te
     tuning.blend_lanes = 0;
     tuning.blend_records = false;
     tuning.exp_builtin = false;
+    tuning.sums_by_chunks = false;
     return with_names(tuning, checkpoint_tuning(info, text, where));
 }
 
@@ -228,6 +241,7 @@ std::string result_tuning(const Device& device) {
     for (const TuningGroup& group : tuning_groups(device.info()))
         if (!group.changes_bits && !(records && group.name == "blend")) names.erase(group.name);
     if (!device.tuning().exp_builtin) names.erase("exp");
+    if (!device.tuning().sums_by_chunks) names.erase("sums");
     return names_text(names);
 }
 
@@ -241,11 +255,14 @@ struct Size {
     std::uint32_t splats;
     int width, height;
     double scale;  // standard deviation of a splat, of a sphere of radius 1 that fills the picture
+    // One splat in so many is large, as trained scenes have some: 8 times the scale, and one in 16
+    // of them 40 times. 0: none.
+    std::uint32_t large_every;
 };
 
 Size size_for(const DeviceInfo& info) {
-    if (info.type == "cpu") return {1'500, 160, 112, 0.04};
-    return {200'000, 1280, 720, 0.01};
+    if (info.type == "cpu") return {1'500, 160, 112, 0.04, 0};
+    return {200'000, 1280, 720, 0.01, 256};
 }
 
 // A CPU is not slow when it idles, and its frames take long.
@@ -269,6 +286,10 @@ SplatModel tuning_scene(const Size& size) {
                 static_cast<float>(std::log(size.scale) + 0.4 * random.normal());
             model.sh_dc[3 * i + a] = static_cast<float>(random.uniform(-1, 1));
         }
+        if (size.large_every > 0 && i % size.large_every == 0)
+            for (std::size_t a = 0; a < 3; ++a)
+                model.log_scale[3 * i + a] +=
+                    std::log(i % (16 * size.large_every) == 0 ? 40.0f : 8.0f);
         for (std::size_t a = 0; a < 4; ++a)
             model.rotation[4 * i + a] = static_cast<float>(random.normal());
         model.opacity_logit[i] = static_cast<float>(1.5 * random.normal());
@@ -437,6 +458,7 @@ TuningFrame::TuningFrame(Device& device, const TimedFrame& frame)
       buffers_(device, frame.options),
       forward_(device, frame.options),
       backward_(device, frame.options),
+      gradients_(device, frame.splats),
       view_{.camera = frame.camera, .sh_degree = frame.sh_degree},
       loss_(device, static_cast<int>(frame.camera.width), static_cast<int>(frame.camera.height),
             {.use_alpha = false}),
@@ -457,14 +479,15 @@ std::vector<double> TuningFrame::run(const std::vector<TuningGroup>& groups) {
     using Clock = std::chrono::steady_clock;
     Clock::time_point start;
     do {
-        backward_.reserve(buffers_.size().intersections);
+        backward_.reserve(splats_.count(), buffers_.size().intersections,
+                          buffers_.frame().checkpoint_records());
         commands_.begin();
         forward_.record(commands_, splats_, view_, buffers_.frame());
         loss_.record(commands_, {buffers_.frame().images.image, photo_, d_image_, loss_result_},
                      static_cast<int>(view_.camera.width), static_cast<int>(view_.camera.height),
                      glm::vec3(0));
-        commands_.pass("blend backward");
-        backward_.record(commands_, view_, buffers_.frame(), d_image_);
+        backward_.record_gradients(commands_, view_, buffers_.frame(), splats_, d_image_,
+                                   {gradients_});
         start = Clock::now();
         commands_.submit_and_wait();
     } while (buffers_.make_room(buffers_.frame().read_status()));

@@ -17,7 +17,7 @@
 
 #include "engine/gpu/commands.h"
 #include "engine/gpu/device.h"
-#include "engine/raster/blend_backward.h"
+#include "engine/raster/backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/loss.h"
@@ -37,8 +37,8 @@ struct TuningGroup {
     bool changes_bits = false;  // results differ by rounding, or by the order of sums of floats
 };
 
-/// scan, scatter, blend, backward, loss, exp and photos, with what the device allows; lanes where
-/// it has several sizes of subgroups.
+/// scan, scatter, depths, emit, tiles, blend, backward, sums, loss, exp and photos, with what the
+/// device allows; lanes where it has several sizes of subgroups.
 std::vector<TuningGroup> tuning_groups(const DeviceInfo& info);
 
 /// Whether the fastest choices are known without measuring: lavapipe, where measuring would take
@@ -59,13 +59,14 @@ TuningNames tuning_names(const Tuning& tuning);
 /// names: as parse_tuning gives them.
 Tuning with_names(Tuning tuning, const TuningNames& names);
 /// The tuning for whoever goes on with a run that began with this text: it leads to the same bits.
-/// If the text does not name them, the lanes were the device's own, exp was a polynomial, and blend
-/// was not by records. Throws as parse_tuning.
+/// If the text does not name them, the lanes were the device's own, exp was a polynomial, blend
+/// was not by records and sums not by chunks. Throws as parse_tuning.
 Tuning resumed_tuning(const DeviceInfo& info, Tuning tuning, std::string_view text,
                       const std::string& where);
 
 /// The choices of the groups that change bits, as text: what a run must keep to be repeated, and
-/// the blend where it is by records. exp is left out where it is a polynomial, as in older files.
+/// the blend where it is by records. exp is left out where it is a polynomial, as in older files,
+/// and sums where each splat has a thread.
 std::string result_tuning(const Device& device);
 
 struct TuningTime {
@@ -87,7 +88,7 @@ struct TimedFrame {
     ForwardOptions options;
 };
 
-/// Forward, loss and backward blend of one frame, by the device's tuning at construction.
+/// Forward, loss and gradients of one frame, by the device's tuning at construction.
 class TuningFrame {
   public:
     /// With the tuner's own scene: the same splats at every call, and more of them where the device
@@ -107,7 +108,8 @@ class TuningFrame {
     const GpuSplats& splats_;
     FrameBuffers buffers_;
     Forward forward_;
-    BlendBackward backward_;
+    Backward backward_;
+    GradientBuffers gradients_;
     FrameView view_;
     Loss loss_;
     Buffer cameras_, photo_, d_image_, loss_result_;
@@ -136,7 +138,7 @@ TuningRecord measure_tuning(Device& device, std::string_view group = {},
 /// A second look at a record, on a frame of a run: in each group the record's choice is compared
 /// with the fastest other one, and the other takes its place where it wins as choose_form finds
 /// it. The record that it returns is seen_in_a_run. The device's tuning and its peak of memory are
-/// afterwards as before; the frame's gradients beyond those of its colours are left out.
+/// afterwards as before; gradients by the camera, by alpha and by depth are left out.
 TuningRecord look_again(Device& device, TuningRecord record, TimedFrame frame);
 
 /// The record of this device in the folder of the pipeline cache; nothing where there is none, or

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
 
 #include "engine/core/error.h"
 #include "engine/primitives/groups.h"
@@ -19,7 +20,10 @@ void check_stored(const ForwardOptions& options) {
 }  // namespace
 
 Backward::Backward(Device& device, const ForwardOptions& options)
-    : device_(&device), options_(options), blend_(device, options) {}
+    : device_(&device),
+      options_(options),
+      blend_(device, options),
+      sums_by_chunks_(device.tuning().sums_by_chunks) {}
 
 BufferList<Backward> Backward::splat_buffers(std::uint64_t splats) {
     return {{&Backward::gradient_sum_, "gradient sum", splats * 8}};
@@ -38,6 +42,7 @@ Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, i
     SpecConstants constants = projection_constants(*device_, options_, sh_degree, sh_stored);
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(blend_.window_intersections());
     constants["CAMERA_GRADIENT"] = options_.camera_gradient && update == UPDATE_STORE ? 1 : 0;
+    constants["SUMS_BY_CHUNKS"] = sums_by_chunks_ ? 1 : 0;
     constants["UPDATE"] = update;
     constants["REST"] = rest;
     return project_.emplace(key, Pipeline(*device_, "project_backward", constants)).first->second;
@@ -53,7 +58,28 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t intersections, std::u
     }
     const std::uint32_t window_intersections = blend_.window_intersections();
     blend_.reserve(intersections, records);
-    if (blend_.window_intersections() != window_intersections) project_.clear();
+    if (blend_.window_intersections() == window_intersections) return;
+    project_.clear();
+    chunks_ = {};
+}
+
+void Backward::record_chunks(Commands& commands, const Frame& frame) {
+    if (!sums_by_chunks_) return;
+    if (!chunks_) {
+        SpecConstants constants = kernel_constants(*device_, options_);
+        constants["WINDOW_INTERSECTIONS"] =
+            static_cast<std::int32_t>(blend_.window_intersections());
+        chunks_ = Pipeline(*device_, "partial_chunks", constants);
+    }
+    const FrameCounters& c = frame.counters;
+    const ProjectedSplats& s = frame.splats;
+    commands.dispatch_indirect(
+        chunks_, NoArgs{},
+        {c.status, c.intersections_in_use, frame.intersections.splat_from_intersection,
+         s.intersection_count, s.first_intersection, blend_.partials(0), blend_.partials(1),
+         blend_.partials(2), blend_.partials(3), blend_.partials(4), blend_.rest(),
+         blend_.exponent()},
+        c.groups, offsetof(gpu::FrameGroups, intersections_x));
 }
 
 void Backward::record_project(Commands& commands, const FrameView& view, const Frame& frame,
@@ -88,6 +114,7 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
 
     if (splats.count() == 0) return;
     commands.pass("project backward");
+    record_chunks(commands, frame);
     const auto n = static_cast<float>(splats.count() + step.splats_gone);
     gpu::ProjectBackwardArgs args{};
     args.camera_index = view.index;
@@ -128,6 +155,7 @@ void Backward::record_gradients(Commands& commands, const FrameView& view, const
 
     if (splats.count() == 0) return;
     commands.pass("project backward");
+    record_chunks(commands, frame);
     gpu::ProjectBackwardArgs args{};
     args.camera_index = view.index;
     args.low_pass = static_cast<float>(LOW_PASS_DEFAULT);

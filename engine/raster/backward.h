@@ -58,6 +58,8 @@ class Backward {
         const Buffer& sums;              // sums of the gradients of means
         BufferRange rest_sum;
     };
+    /// Adds up the partials of large splats, by the device's tuning.
+    void record_chunks(Commands& commands, const Frame& frame);
     void record_project(Commands& commands, const FrameView& view, const Frame& frame,
                         const GpuSplats& splats, Pipeline& pipeline,
                         const gpu::ProjectBackwardArgs& args, const ProjectBuffers& extra);
@@ -65,6 +67,8 @@ class Backward {
     Device* device_;
     ForwardOptions options_;
     BlendBackward blend_;
+    bool sums_by_chunks_;  // by the device's tuning
+    Pipeline chunks_;      // made when needed
     // Keyed by the degree in use, that of the buffers, UPDATE_* and REST_*.
     std::map<std::array<int, 4>, Pipeline> project_;
     std::uint32_t splat_capacity_ = 0;

@@ -29,7 +29,10 @@ std::uint64_t BlendBackward::max_intersections(const Device& device) {
 }
 
 BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
-    : device_(&device), options_(options), method_(device.tuning().backward) {
+    : device_(&device),
+      options_(options),
+      method_(device.tuning().backward),
+      longest_first_(device.tuning().longest_first) {
     make_pipelines(false);
     make_buffers(device, *this, segment_buffers({}), "blend backward");
 }
@@ -65,6 +68,7 @@ void BlendBackward::make_pipelines(bool segmented) {
     const std::uint32_t subgroup = add_block_constants(*device_, constants);
     constants["THREADS"] = static_cast<std::int32_t>(subgroup);
     constants["ALPHA_GRADIENT"] = options_.alpha_gradient || options_.depth_sum ? 1 : 0;
+    constants["LONGEST_FIRST"] = longest_first_ ? 1 : 0;
     constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     constants["BUCKET"] = static_cast<std::int32_t>(bucket_length(*device_));
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window_intersections_);

@@ -54,6 +54,7 @@ class BlendBackward {
     Device* device_;
     ForwardOptions options_;
     BackwardBlend method_;
+    bool longest_first_;
     Pipeline blend_;                         // used by every method
     Pipeline bucket_tiles_, bucket_behind_;  // for buckets
     bool segmented_ = false;                 // whether the pipelines take segments

@@ -81,6 +81,9 @@ std::uint32_t add_block_constants(const Device& device, SpecConstants& constants
 Forward::Forward(Device& device, const ForwardOptions& options)
     : device_(&device),
       options_(options),
+      short_depths_(device.tuning().short_depths && options.depth_order != DEPTH_ORDER_CENTRE16),
+      emits_slots_(device.tuning().emit_by_slots),
+      longest_first_(device.tuning().longest_first),
       records_(device.tuning().blend_records),
       blend_threads_(
           std::max(records_ ? kBlocks * blend_subgroup(device) : device.tuning().blend_threads,
@@ -92,12 +95,18 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     SpecConstants of_splat = kernel_constants(device, options);
     of_splat["THREADS"] = SPLAT_GROUP;
     compact_ = Pipeline(device, "compact", of_splat);
+    if (short_depths_) {
+        SpecConstants of_keys = of_splat;
+        of_keys["SHORT_KEYS"] = 1;
+        compact_short_.emplace(device, "compact", of_keys);
+    }
     gather_counts_ = Pipeline(device, "gather_counts", per_item);
     groups_visible_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 0}}, false);
     groups_intersections_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 1}}, false);
     tile_ranges_ = Pipeline(device, "tile_ranges", per_item);
     list_lengths_ = Pipeline(device, "list_lengths", per_item);
-    emit_ = Pipeline(device, "emit", of_splat);
+    if (longest_first_) tile_order_ = Pipeline(device, "tile_order");
+    emit_ = Pipeline(device, emits_slots_ ? "emit_slots" : "emit", of_splat);
 }
 
 Pipeline& Forward::project_pipeline(int sh_degree, int sh_stored) {
@@ -124,6 +133,7 @@ Pipeline& Forward::blend_pipeline(const Frame& frame) {
     blend["PIXELS"] = static_cast<std::int32_t>(TILE_SIZE * TILE_SIZE / blend_threads_);
     blend["CHECKPOINTS"] = frame.size.bucket > 0 ? 1 : 0;
     if (frame.size.bucket > 0) blend["BUCKET"] = static_cast<std::int32_t>(frame.size.bucket);
+    blend["LONGEST_FIRST"] = longest_first_ ? 1 : 0;
     blend["SEGMENT"] = parts ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     pipeline = Pipeline(*device_, blends_records(frame) ? "blend_records" : "blend", blend, true,
                         subgroup);
@@ -203,9 +213,24 @@ void Forward::record_depth_order(Commands& commands, std::uint32_t n, float near
     frame.sorts.scan->record(commands, s.visible, s.visible_offset, c.splats, 0, c.visible);
     commands.dispatch(groups_visible_, gpu::IntersectionArgs{frame.size.intersections, 0, 0, 0},
                       {c.status, c.groups, c.visible, c.visible_in_use}, 1);
-    commands.dispatch(compact_, gpu::CompactArgs{n, near_plane},
-                      {s.visible, s.visible_offset, s.bound, s.depth_key, s.splat_from_depth}, g.x,
-                      g.y);
+    const RadixSort& sort = *frame.sorts.by_depth;
+    // A sort of an odd number of digits takes its pairs in its scratch buffers.
+    const bool in_scratch = short_depths_ && !frame.size.deep && sort.is_odd(SHORT_DEPTH_BITS);
+    const gpu::CompactArgs args{n, near_plane};
+    if (in_scratch) {
+        commands.dispatch(*compact_short_, args,
+                          {s.visible, s.visible_offset, s.bound, sort.scratch_keys(),
+                           sort.scratch_values(), c.status},
+                          g.x, g.y);
+        commands.pass("depth sort");
+        frame.sorts.by_depth->record_from_scratch(commands, s.depth_key, s.splat_from_depth,
+                                                  c.visible_in_use, 0, SHORT_DEPTH_BITS);
+        return;
+    }
+    commands.dispatch(compact_, args,
+                      {s.visible, s.visible_offset, s.bound, s.depth_key, s.splat_from_depth,
+                       frame.intersections.no_huge_rank},  // in place of the status: no barrier
+                      g.x, g.y);
     commands.pass("depth sort");
     const int key_bits = options_.depth_order == DEPTH_ORDER_CENTRE16 ? DEPTH_KEY_BITS : 32;
     frame.sorts.by_depth->record(commands, s.depth_key, s.splat_from_depth, c.visible_in_use, 0,
@@ -217,7 +242,7 @@ void Forward::record_emission(Commands& commands, std::uint32_t n,
     const FrameCounters& c = frame.counters;
     const ProjectedSplats& s = frame.splats;
     const TileIntersections& out = frame.intersections;
-    const bool huge = frame.cooperates;
+    const bool huge = frame.cooperates && !emits_slots_;
     if (huge) make_huge_pipelines();
     constexpr std::uint64_t of_visible = offsetof(gpu::FrameGroups, visible_x);
     commands.pass("emit");
@@ -229,6 +254,10 @@ void Forward::record_emission(Commands& commands, std::uint32_t n,
                              c.intersections);
     commands.dispatch(groups_intersections_, args,
                       {c.status, c.groups, c.intersections, c.intersections_in_use}, 1);
+    if (emits_slots_) {
+        record_slots(commands, args, frame);
+        return;
+    }
     commands.dispatch_indirect(huge ? *emit_others_ : emit_, args,
                                {c.status, s.splat_from_depth, s.offset_by_depth, s.cover, out.tile,
                                 out.splat_from_intersection, s.first_intersection, s.shape, s.bound,
@@ -239,6 +268,18 @@ void Forward::record_emission(Commands& commands, std::uint32_t n,
                           {c.status, s.splat_from_depth, s.offset_by_depth, s.cover, out.tile,
                            out.splat_from_intersection, out.huge_rank, s.shape, s.bound},
                           EMIT_HUGE_GROUPS);
+}
+
+// Huge splats are no slower there than others.
+void Forward::record_slots(Commands& commands, const gpu::IntersectionArgs& args, Frame& frame) {
+    const FrameCounters& c = frame.counters;
+    const ProjectedSplats& s = frame.splats;
+    const TileIntersections& out = frame.intersections;
+    commands.dispatch_indirect(emit_, args,
+                               {c.status, s.splat_from_depth, s.offset_by_depth, s.cover, out.tile,
+                                out.splat_from_intersection, s.first_intersection, s.shape, s.bound,
+                                c.intersections_in_use},
+                               c.groups, offsetof(gpu::FrameGroups, intersections_x));
 }
 
 void Forward::record_tiles(Commands& commands, const gpu::IntersectionArgs& args, Frame& frame) {
@@ -253,6 +294,7 @@ void Forward::record_tiles(Commands& commands, const gpu::IntersectionArgs& args
                                c.groups, offsetof(gpu::FrameGroups, intersections_x));
     const Groups g = groups_for(args.tile_count);
     commands.dispatch(list_lengths_, args, {c.status, t.tile_range}, g.x, g.y);
+    if (longest_first_) commands.dispatch(tile_order_, args, {t.tile_range}, 1);
 }
 
 void Forward::record_blend(Commands& commands, const FrameView& view, Frame& frame) {

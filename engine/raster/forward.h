@@ -59,17 +59,20 @@ class Forward {
                             Frame& frame);
     void record_emission(Commands& commands, std::uint32_t splats,
                          const gpu::IntersectionArgs& args, Frame& frame);
+    void record_slots(Commands& commands, const gpu::IntersectionArgs& args, Frame& frame);
     void record_tiles(Commands& commands, const gpu::IntersectionArgs& args, Frame& frame);
 
     Device* device_;
     ForwardOptions options_;
-    bool records_;                                     // by the device's tuning, like the next
+    // By the device's tuning, like the next.
+    bool short_depths_, emits_slots_, longest_first_, records_;
     std::uint32_t blend_threads_;                      // threads of a tile's workgroup
     std::map<std::pair<int, int>, Pipeline> project_;  // by SH degree in use and in the buffers
     Pipeline compact_, gather_counts_, groups_visible_, groups_intersections_, emit_, tile_ranges_,
-        list_lengths_;
-    std::array<Pipeline, 2> blend_;        // made when needed: for whole lists, for parts
-    std::optional<Pipeline> depth_light_;  // made when a depth image is first asked for
+        list_lengths_, tile_order_;
+    std::array<Pipeline, 2> blend_;          // made when needed: for whole lists, for parts
+    std::optional<Pipeline> compact_short_;  // for keys of SHORT_DEPTH_BITS
+    std::optional<Pipeline> depth_light_;    // made when a depth image is first asked for
     std::optional<Pipeline> emit_others_, emit_huge_;  // made when a frame first has huge splats
 };
 

@@ -21,6 +21,7 @@ struct FrameSize {
     std::uint32_t tiles = 0;          // tiles of the image with the most
     std::uint32_t list_segments = 1;  // dispatches of the blend passes, LIST_SEGMENT of a list each
     bool cooperates = false;          // some frame had huge splats
+    bool deep = false;                // some frame had depths beyond SHORT_DEPTH_BITS
     std::uint32_t bucket = 0;         // intersections per checkpoint; 0: there are none
     bool shaped = false;              // the kernel has shapes
     bool depth_sum = false;           // as in ForwardOptions
@@ -70,7 +71,7 @@ struct TileIntersections {
     Buffer tile;                      // [K] sorted
     Buffer splat_from_intersection;   // [K] in the order of emission: splat and blocks of the tile
     Buffer intersection_from_sorted;  // [K] by tile, then by depth
-    Buffer tile_range;                // [T][2] of that
+    Buffer tile_range;                // [T][2] of that; then the tiles in the order of the blends
     Buffer huge_rank;                 // [K / HUGE_INTERSECTIONS + 1], once a frame had huge splats
     Buffer no_huge_rank;              // a word, in its place until then
 };

@@ -36,6 +36,10 @@ std::uint32_t most_intersections(const Device& device, const ForwardOptions& opt
                                       device.info().max_storage_buffer_bytes / 8, 1u << 30)));
 }
 
+int depth_digit_bits(const Device& device) {
+    return device.tuning().short_depths ? RadixSort::kWideDigitBits : RadixSort::kDigitBits;
+}
+
 BufferList<FrameCounters> counter_buffers() {
     using C = FrameCounters;
     return {{&C::status, "frame status", sizeof(gpu::FrameStatus)},
@@ -83,7 +87,7 @@ BufferList<TileIntersections> huge_buffers(std::uint64_t k) {
 }
 
 BufferList<TileIntersections> tile_buffers(std::uint64_t tiles) {
-    return {{&TileIntersections::tile_range, "tile range", tiles * 8}};
+    return {{&TileIntersections::tile_range, "tile range", tiles * 16}};
 }
 
 BufferList<FrameImages> checkpoint_buffers(const FrameSize& size) {
@@ -136,7 +140,8 @@ FrameBytes FrameBuffers::device_bytes(const Device& device, const ForwardOptions
                                       const FrameSize& size) {
     FrameBytes bytes;
     bytes.splats = charged_bytes(splat_buffers(options, size.splats)) +
-                   Scan::device_bytes(size.splats) + RadixSort::device_bytes(device, size.splats);
+                   Scan::device_bytes(size.splats) +
+                   RadixSort::device_bytes(device, size.splats, depth_digit_bits(device));
     bytes.intersections = charged_bytes(intersection_buffers(size.intersections)) +
                           RadixSort::device_bytes(device, size.intersections);
     if (size.cooperates) bytes.intersections += charged_bytes(huge_buffers(size.intersections));
@@ -186,7 +191,7 @@ void FrameBuffers::reserve_splats(std::uint32_t splats) {
     frame_.sorts.by_depth.reset();
     make_buffers(*device_, frame_.splats, splat_buffers(options_, splats), "project");
     frame_.sorts.scan.emplace(*device_, splats);
-    frame_.sorts.by_depth.emplace(*device_, splats);
+    frame_.sorts.by_depth.emplace(*device_, splats, std::nullopt, 0, depth_digit_bits(*device_));
     frame_.size.splats = splats;
 }
 
@@ -273,6 +278,7 @@ bool FrameBuffers::make_room(const gpu::FrameStatus& status,
         (status.overflow & OVERFLOW_TOTAL) != 0 ? 0xFFFFFFFFu : status.intersections;
     if (wanted > most) throw too_many(*device_, wanted, most, frame_.size.bucket > 0);
     if ((status.overflow & OVERFLOW_INTERSECTIONS) != 0) grow(wanted, most, make_other_buffers);
+    if ((status.overflow & OVERFLOW_DEPTHS) != 0) frame_.size.deep = true;
     segment_lists(status.longest_list);
     clear_status();
     return true;

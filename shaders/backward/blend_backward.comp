@@ -45,6 +45,7 @@ layout(set = 0, binding = 17, scalar) buffer PartialExponent { float partial_exp
 #include "lib/area.glsl"
 #include "lib/depth_sum.glsl"
 #include "lib/list_part.glsl"
+#include "lib/own_tile.glsl"
 const uint CHUNK = 128u;
 #include "lib/hits.glsl"
 #define PARTIALS_BINDING 9
@@ -94,7 +95,7 @@ void blend_area(uint area, uvec2 tile, uvec2 range) {
 }
 
 void main() {
-    const uvec2 tile = gl_WorkGroupID.xy;
+    const uvec2 tile = own_tile();
     const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
     if (range.x >= range.y) return;
     uint area = 0u;

@@ -79,7 +79,7 @@ void store_chunk(uint end) {
 }
 
 void main() {
-    const uvec2 tile = gl_WorkGroupID.xy;
+    const uvec2 tile = own_tile();
     const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
     if (range.x >= range.y) return;
     const uint area = gl_SubgroupID;

@@ -22,6 +22,7 @@ layout(constant_id = 1) const int SH_DEGREE = 0;
 layout(constant_id = 2) const int SH_STORED = 0;
 layout(constant_id = 3) const int UPDATE = UPDATE_ADAM;
 layout(constant_id = 4) const int REST = REST_EACH;
+layout(constant_id = 34) const int SUMS_BY_CHUNKS = 0;  // 1: partial_chunks.comp has added up chunks of intersections
 
 #define STATE_BINDING (1 + ATTRIBUTES)
 #define FRAME_BINDING (1 + 2 * ATTRIBUTES)
@@ -83,10 +84,11 @@ layout(set = 0, binding = FRAME_BINDING + 12, scalar) readonly buffer PartialExp
 Partial sum_partials(uint i) {
     Partial sums = Partial(vec4(0.0), 0.0, 0.0, 0.0, 0.0, vec3(0.0));
     uint e = first_intersection[i];
-    const uint end = e + intersection_count[i];
+    const uint count = intersection_count[i], end = e + count;
+    const uint stride = SUMS_BY_CHUNKS == 1 && count > uint(SUM_CHUNK) ? uint(SUM_CHUNK) : 1u;
     for (uint stop = e; e < end;) {
         stop = min(stop + 32768u, end);  // some drivers end loops after 65,535 rounds
-        for (; e < stop; ++e) {
+        for (; e < stop; e += stride) {
             const vec4 light = load_partial(e, 1u);
             sums.a += load_partial(e, 0u);
             sums.b += partial_rest[RESTS * e];

@@ -30,3 +30,4 @@ layout(set = 0, binding = 17, scalar) writeonly buffer PartialExponent { float p
 #include "lib/area.glsl"
 #include "lib/depth_sum.glsl"
 #include "lib/list_part.glsl"
+#include "lib/own_tile.glsl"

@@ -90,7 +90,7 @@ void store_checkpoint(Pixels px, uint record) {
 }
 
 void main() {
-    const uvec2 tile = gl_WorkGroupID.xy;
+    const uvec2 tile = own_tile();
     const uint tile_index = tile.y * args.tiles_x + tile.x;
     const uvec2 whole = tile_range[tile_index], range = list_part(whole);
     const uint bits = area_bits(gl_SubgroupID);

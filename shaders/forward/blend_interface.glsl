@@ -29,6 +29,7 @@ layout(set = 0, binding = 10, scalar) readonly buffer SplatExponent { float spla
 #include "lib/projected.glsl"
 #include "lib/area.glsl"
 #include "lib/list_part.glsl"
+#include "lib/own_tile.glsl"
 #include "lib/bucket.glsl"
 const uint CHUNK = CHECKPOINTS == 1 ? BUCKET : 128u;
 #include "lib/hits.glsl"

@@ -95,7 +95,7 @@ bool blend_hits(inout Pixels px, inout bool any_ended, vec2 centre, uint count) 
 #include "forward/blend_state.glsl"
 
 void main() {
-    const uvec2 tile = gl_WorkGroupID.xy;
+    const uvec2 tile = own_tile();
     const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
     const uint bits = area_bits(gl_SubgroupID);
     const uvec2 first = tile * TILE_SIZE + first_pixel(gl_SubgroupID, gl_SubgroupInvocationID);

@@ -11,6 +11,7 @@
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
+layout(constant_id = 1) const int SHORT_KEYS = 0;  // 1: of SHORT_DEPTH_BITS; deeper ones raise a flag
 
 #include "lib/depth.glsl"
 #include "lib/linear_id.glsl"
@@ -21,11 +22,15 @@ layout(set = 0, binding = 1, scalar) readonly buffer VisibleOffset { uint visibl
 layout(set = 0, binding = 2, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer DepthKey { uint depth_key[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer SplatFromDepth { uint splat_from_depth[]; };
+layout(set = 0, binding = 5, scalar) buffer Status { FrameStatus status; };  // with SHORT_KEYS
 
 void main() {
     const uint i = linear_id();
     if (i >= args.splat_count || visible[i] == 0u) return;
     const uint slot = visible_offset[i];
-    depth_key[slot] = sort_key(splat_bound[i].z, args.near_plane);
+    const uint key = SHORT_KEYS == 1 ? short_sort_key(splat_bound[i].z, args.near_plane)
+                                     : sort_key(splat_bound[i].z, args.near_plane);
+    if (SHORT_KEYS == 1 && key >= 1u << SHORT_DEPTH_BITS) atomicOr(status.overflow, OVERFLOW_DEPTHS);
+    depth_key[slot] = key;
     splat_from_depth[slot] = i;
 }

@@ -14,4 +14,9 @@ uint sort_key(float depth, float near_plane) {
     return min((bits - floatBitsToUint(near_plane)) >> DEPTH_KEY_SHIFT, (1u << DEPTH_KEY_BITS) - 1u);
 }
 
+// The same order from the near plane on, before which there are no depths.
+uint short_sort_key(float depth, float near_plane) {
+    return floatBitsToUint(depth) - floatBitsToUint(max(near_plane, 0.0));
+}
+
 #endif

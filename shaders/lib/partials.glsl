@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The sums of splat-tile intersections, PARTIALS floats each, in the order of the intersections' slots. blend_backward
 // adds to them (define PARTIALS_PUT as +=), blend_backward_team sets them (as =), blend_backward_pixels sets four at a
-// time (PARTIALS_PUT_FOURS), and others read them. Where one binding cannot hold them, the buffer is bound in
+// time (PARTIALS_PUT_FOURS), partial_chunks both sets and reads them (PARTIALS_GET), and others read them. Where one binding cannot hold them, the buffer is bound in
 // PARTIAL_WINDOWS windows of WINDOW_INTERSECTIONS intersections each, from PARTIALS_BINDING on.
 
 layout(constant_id = 9) const uint WINDOW_INTERSECTIONS = 0;  // 0: the first window has them all
@@ -39,6 +39,16 @@ void put_partial(uint slot, uint i, float value) {
     else if (window == 3u) partials3[at] PARTIALS_PUT value;
     else partials4[at] PARTIALS_PUT value;
 }
+#ifdef PARTIALS_GET
+float get_partial(uint slot, uint i) {
+    const uint window = partial_window(slot), at = slot * PARTIALS + i;
+    if (WINDOW_INTERSECTIONS == 0u || window == 0u) return partials0[at];
+    if (window == 1u) return partials1[at];
+    if (window == 2u) return partials2[at];
+    if (window == 3u) return partials3[at];
+    return partials4[at];
+}
+#endif
 #elif defined(PARTIALS_PUT_FOURS)
 // part: as for load_partial.
 void put_four(uint slot, uint part, vec4 value) {

@@ -37,7 +37,7 @@ vec2 columns_between(EllipseRows e, float low_y, float high_y) {
 }
 
 // A splat's tiles: a rectangle of tiles cut into at most 8 x 8 cells, with one bit for each cell that the ellipse
-// touches. Counting and emission both read this, so they cannot disagree.
+// touches; those of a row are contiguous. Counting and emission both read this, so they cannot disagree.
 struct TileCover {
     uvec2 origin;  // tile
     uvec2 extent;  // tiles

@@ -5,7 +5,8 @@
 
 #include "types.h"
 
-#define RADIX_MAX_DIGITS 256  // 8 bits a pass
+#define RADIX_MAX_DIGITS 256   // 8 bits a pass, usually
+#define RADIX_WIDE_DIGITS 512  // 9 bits
 #define RADIX_MAX_PASSES 4
 #define RADIX_THREADS 64  // threads of the pass that prepares
 
@@ -17,6 +18,7 @@ struct RadixPrepareArgs {
     uint capacity;    // pairs that the buffers hold
     uint count_word;  // index of the pair count in its buffer, in words
     uint block;       // pairs of one workgroup
+    uint totals;      // totals of all passes
 };
 
 // What the prepare pass leaves for the other passes. The first three words are a dispatch command.
@@ -29,12 +31,12 @@ struct RadixPlan {
 
 struct RadixPassArgs {
     uint shift;   // first bit of this pass's digit
-    uint digits;  // values of the digit, a power of two up to RADIX_MAX_DIGITS
-    uint first;   // where the pass's totals begin: RADIX_MAX_DIGITS times its number
+    uint digits;  // values of the digit, a power of two
+    uint first;   // where the pass's totals begin: the most digits times its number
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(RadixPrepareArgs) == 12 && sizeof(RadixPlan) == 16);
+static_assert(sizeof(RadixPrepareArgs) == 16 && sizeof(RadixPlan) == 16);
 static_assert(sizeof(RadixPassArgs) == 12);
 }  // namespace darb::gpu
 #endif

@@ -35,6 +35,12 @@
 #define PARTIALS 8u
 #define PARTIAL_WINDOWS 5u
 
+// Intersections of a splat whose sums partial_chunks.comp adds up together, where the splat has
+// more of them. Eight threads share each of the PARTIALS sums.
+#define SUM_CHUNK 64
+
+#define TILE_ORDER_THREADS 256  // of the one workgroup that orders tiles
+
 // A splat with more intersections than this is huge: one thread would still write them long after
 // all others are done. With COOPERATE of emit.comp, a workgroup of EMIT_HUGE_THREADS writes them,
 // one cell of the cover per thread.
@@ -46,6 +52,10 @@
 #define OVERFLOW_INTERSECTIONS 1u  // more intersections than their buffers hold
 #define OVERFLOW_LISTS 2u          // a tile's list is longer than the blend dispatches take on
 #define OVERFLOW_TOTAL 4u          // the number of intersections exceeds 32 bits
+#define OVERFLOW_DEPTHS 8u         // a depth is beyond what SHORT_DEPTH_BITS reach
+
+// Bits of a depth key in three digits: sixteen powers of two from the near plane on.
+#define SHORT_DEPTH_BITS 27
 
 // Why a splat takes no part in a frame; indexes FrameStatus.culled.
 #define CULL_NEAR 0        // not in front of the near plane, or position not finite
@@ -117,7 +127,7 @@ struct SplatArgs {     // gather_counts
     uint splat_count;  // N
 };
 
-struct IntersectionArgs {  // frame_groups, emit, tile_ranges, list_lengths
+struct IntersectionArgs {  // frame_groups, emit, tile_ranges, list_lengths, tile_order
     uint intersection_capacity;
     uint tiles_x;
     uint tile_count;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Radix sort, step 1 of 3 of a pass: counts how often each digit occurs in each block. One workgroup per block of
-// THREADS * ITEMS keys. Shared memory: 1 KiB of counters. Reads keys [n]; writes histograms [digits][blocks] and adds
+// THREADS * ITEMS keys. Shared memory: DIGITS counters. Reads keys [n]; writes histograms [digits][blocks] and adds
 // to the totals [digits] of the pass.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -10,6 +10,7 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 32;
 layout(constant_id = 1) const uint ITEMS = 256;
+layout(constant_id = 4) const uint DIGITS = RADIX_MAX_DIGITS;  // the most that a digit has
 
 layout(push_constant, scalar) uniform Push { RadixPassArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Plan { RadixPlan plan; };
@@ -17,7 +18,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer Keys { uint keys[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Histograms { uint histograms[]; };
 layout(set = 0, binding = 3, scalar) buffer Totals { uint totals[]; };
 
-shared uint counters[RADIX_MAX_DIGITS];
+shared uint counters[DIGITS];
 
 void main() {
     const uint thread = gl_LocalInvocationID.x;

@@ -11,6 +11,7 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 32;
 layout(constant_id = 1) const uint ITEMS = 256;
+layout(constant_id = 4) const uint DIGITS = RADIX_MAX_DIGITS;  // the most that a digit has
 
 layout(push_constant, scalar) uniform Push { RadixPassArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Plan { RadixPlan plan; };
@@ -21,8 +22,8 @@ layout(set = 0, binding = 3, scalar) buffer Totals { uint totals[]; };
 void main() {
     const uint begin = min((gl_WorkGroupID.x * THREADS + gl_LocalInvocationID.x) * ITEMS, plan.count);
     const uint end = min(begin + ITEMS, plan.count);
-    uint column[RADIX_MAX_DIGITS];
-    for (uint d = 0; d < RADIX_MAX_DIGITS; ++d) column[d] = 0;
+    uint column[DIGITS];
+    for (uint d = 0; d < DIGITS; ++d) column[d] = 0;
     for (uint i = begin; i < end; ++i) column[(keys[i] >> args.shift) & (args.digits - 1)] += 1;
     for (uint d = 0; d < args.digits; ++d) {
         const uint count = subgroupAdd(column[d]);

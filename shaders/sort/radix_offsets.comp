@@ -2,7 +2,7 @@
 // Radix sort, step 2 of 3 of a pass: finds where the keys of each digit and block go, by an exclusive sum over all
 // digits and, within a digit, over the blocks. One workgroup per digit: it sums the totals of the lower digits and
 // walks its row THREADS blocks at a time. With TEAM_IS_THREAD, one thread per digit: see scan_team.glsl. Shared memory:
-// one word per subgroup. Reads totals [RADIX_MAX_DIGITS] of the pass; reads and writes histograms [digits][blocks].
+// one word per subgroup. Reads totals [digits] of the pass; reads and writes histograms [digits][blocks].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

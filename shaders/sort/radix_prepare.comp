@@ -11,11 +11,11 @@ layout(local_size_x = RADIX_THREADS) in;
 layout(push_constant, scalar) uniform Push { RadixPrepareArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Count { uint count_in[]; };
 layout(set = 0, binding = 1, scalar) writeonly buffer Plan { RadixPlan plan; };
-layout(set = 0, binding = 2, scalar) writeonly buffer Totals { uint totals[]; };  // [RADIX_MAX_PASSES][digits]
+layout(set = 0, binding = 2, scalar) writeonly buffer Totals { uint totals[]; };  // [passes][digits]
 
 void main() {
     const uint thread = gl_LocalInvocationID.x;
-    for (uint i = thread; i < RADIX_MAX_PASSES * RADIX_MAX_DIGITS; i += RADIX_THREADS) totals[i] = 0;
+    for (uint i = thread; i < args.totals; i += RADIX_THREADS) totals[i] = 0;
     if (thread != 0) return;
     const uint count = min(count_in[args.count_word], args.capacity);
     plan.groups_x = count / args.block + uint(count % args.block != 0);

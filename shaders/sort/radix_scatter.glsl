@@ -3,6 +3,7 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 32;
 layout(constant_id = 1) const uint ITEMS = 256;   // keys of one thread
+layout(constant_id = 4) const uint DIGITS = RADIX_MAX_DIGITS;  // the most that a digit has
 layout(constant_id = 2) const bool IOTA = false;     // value i is i, and is not read
 
 layout(push_constant, scalar) uniform Push { RadixPassArgs args; };

@@ -2,7 +2,7 @@
 // Radix sort, step 3 of 3 of a pass, for GPUs: a subgroup ranks a row of keys by one ballot per digit bit. The rows of
 // a subgroup are contiguous, so that all reads are. The block's keys are brought into order in shared memory, so that
 // keys with the same digit are written side by side. After Adinets and Merrill 2022. One workgroup per block of THREADS
-// * ITEMS keys. Shared memory: the block's keys, 1 KiB per subgroup, and 1 KiB more. Reads offsets [digits][blocks],
+// * ITEMS keys. Shared memory: the block's keys, DIGITS words per subgroup, and as many more. Reads offsets [digits][blocks],
 // keys and values [n]; writes keys and values [n].
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -15,10 +15,10 @@
 
 layout(constant_id = 3) const uint SUBGROUPS = 4;  // at least gl_NumSubgroups
 
-const uint RUN = RADIX_MAX_DIGITS / THREADS;  // digits that a thread counts
+const uint RUN = DIGITS / THREADS;  // digits that a thread counts
 
-shared uint counters[SUBGROUPS * RADIX_MAX_DIGITS];  // [subgroup][digit]
-shared uint digit_places[RADIX_MAX_DIGITS];  // where a digit's keys go, less their place in the block
+shared uint counters[SUBGROUPS * DIGITS];  // [subgroup][digit]
+shared uint digit_places[DIGITS];  // where a digit's keys go, less their place in the block
 shared uint subgroup_sums[SUBGROUPS];
 shared uint block_words[THREADS * ITEMS];  // the block's keys or values in order
 
@@ -40,7 +40,7 @@ void place_digits() {
     uint total = 0;
     for (uint d = first; d < first + RUN; ++d) {
         digit_places[d] = total;
-        for (uint s = 0; s < gl_NumSubgroups; ++s) total += counters[s * RADIX_MAX_DIGITS + d];
+        for (uint s = 0; s < gl_NumSubgroups; ++s) total += counters[s * DIGITS + d];
     }
     const uint inclusive = subgroupInclusiveAdd(total);
     if (gl_SubgroupInvocationID == gl_SubgroupSize - 1) subgroup_sums[gl_SubgroupID] = inclusive;
@@ -51,18 +51,18 @@ void place_digits() {
         uint place = digit_places[d] + before;
         digit_places[d] = block_offset(d) - place;
         for (uint s = 0; s < gl_NumSubgroups; ++s) {
-            const uint count = counters[s * RADIX_MAX_DIGITS + d];
-            counters[s * RADIX_MAX_DIGITS + d] = place;
+            const uint count = counters[s * DIGITS + d];
+            counters[s * DIGITS + d] = place;
             place += count;
         }
     }
 }
 
 void main() {
-    const uint row = gl_SubgroupID * RADIX_MAX_DIGITS, thread = gl_LocalInvocationID.x;
+    const uint row = gl_SubgroupID * DIGITS, thread = gl_LocalInvocationID.x;
     const uint block = gl_WorkGroupID.x * THREADS * ITEMS, count = min(plan.count - block, THREADS * ITEMS);
     const uint begin = gl_SubgroupID * gl_SubgroupSize * ITEMS + gl_SubgroupInvocationID;
-    for (uint i = thread; i < SUBGROUPS * RADIX_MAX_DIGITS; i += THREADS) counters[i] = 0;
+    for (uint i = thread; i < SUBGROUPS * DIGITS; i += THREADS) counters[i] = 0;
     barrier();
 
     uint keys[ITEMS], ranks[ITEMS];

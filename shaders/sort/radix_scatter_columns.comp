@@ -15,8 +15,8 @@ void main() {
     const uint begin = min((gl_WorkGroupID.x * THREADS + gl_LocalInvocationID.x) * ITEMS, n);
     const uint end = min(begin + ITEMS, n);
 
-    uint column[RADIX_MAX_DIGITS];
-    for (uint d = 0; d < RADIX_MAX_DIGITS; ++d) column[d] = 0;
+    uint column[DIGITS];
+    for (uint d = 0; d < DIGITS; ++d) column[d] = 0;
     for (uint i = begin; i < end; ++i) column[digit_of(keys_in[i])] += 1;
     // Turns counts into places: keys of earlier threads go first.
     for (uint d = 0; d < args.digits; ++d)

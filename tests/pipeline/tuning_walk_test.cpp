@@ -20,12 +20,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+const SceneOptions kSmallSplats{
+    .count = 600, .width = 121, .height = 83, .sh_degree = 1, .max_logit = 1, .seed = 21};
+
 struct WalkScene {
-    TestScene scene = random_scene(
-        {.count = 600, .width = 121, .height = 83, .sh_degree = 1, .max_logit = 1, .seed = 21});
+    TestScene scene;
     Image<double> weights{scene.camera.width, scene.camera.height, 3};
 
-    WalkScene() {
+    explicit WalkScene(const SceneOptions& options = kSmallSplats) : scene(random_scene(options)) {
         Pcg32 random(3);
         for (double& w : weights.data) w = static_cast<float>(random.uniform(-1, 1));
     }
@@ -53,6 +55,60 @@ TEST(TuningWalk, ways_change_bits_only_where_the_table_says_so) {
                 EXPECT_EQ(walk.d, usual.d);
             }
         }
+}
+
+// Splats over hundreds of tiles, some of them huge.
+TEST(TuningWalk, ways_for_large_splats_repeat_and_agree) {
+    const WalkScene s({.count = 60,
+                       .width = 420,
+                       .height = 330,
+                       .sh_degree = 1,
+                       .min_log_scale = -4,
+                       .max_log_scale = 0.5,
+                       .min_logit = -3,
+                       .max_logit = -1,
+                       .seed = 23});
+    const DeviceWalk usual = s.walk();
+    ASSERT_GT(usual.status.huge_splats, 0U);
+    for (const char* way :
+         {"depths=three", "emit=slots", "tiles=longest", "depths=three,emit=slots,tiles=longest"}) {
+        const ScopedVariants variants(shared_device(), way);
+        const DeviceWalk walk = s.walk();
+        EXPECT_EQ(walk.image.data, usual.image.data) << way;
+        EXPECT_EQ(walk.d, usual.d) << way;
+        EXPECT_EQ(walk.intersection_count, usual.intersection_count) << way;
+        EXPECT_EQ(walk.status.huge_splats, usual.status.huge_splats) << way;
+    }
+    const ScopedVariants variants(shared_device(), "sums=chunks");
+    const DeviceWalk walk = s.walk();
+    EXPECT_EQ(walk.d, s.walk().d) << "a rerun";
+    EXPECT_NE(walk.d, usual.d) << "both ways summed in one order";
+    for (int a = 0; a < kAttributeCount; ++a) {
+        double largest = 0;
+        for (const float value : usual.d[a]) largest = std::max(largest, std::abs(double{value}));
+        for (std::size_t i = 0; i < walk.d[a].size(); ++i)
+            ASSERT_NEAR(walk.d[a][i], usual.d[a][i], 1e-5 * largest) << attribute_name(a) << i;
+    }
+}
+
+// The farthest splat is 100,000 times as far away as the near plane, so the frame is made again.
+TEST(TuningWalk, short_depths_give_way_to_long_ones) {
+    WalkScene s;
+    const glm::dvec3 far_point =
+        glm::transpose(s.scene.camera.rotation) *
+        (glm::dvec3(0, 0, 1e5 * NEAR_DEFAULT) - s.scene.camera.translation);
+    for (int c = 0; c < 3; ++c) {
+        s.scene.model.position[static_cast<std::size_t>(c)] = static_cast<float>(far_point[c]);
+        s.scene.model.log_scale[static_cast<std::size_t>(c)] = 8;
+    }
+    s.scene.model.opacity_logit[0] = 3;
+    const DeviceWalk usual = s.walk();
+    ASSERT_GT(usual.intersection_count[0], 0U) << "it is meant to show";
+    const ScopedVariants variants(shared_device(), "depths=three");
+    const DeviceWalk walk = s.walk();
+    EXPECT_EQ(walk.image.data, usual.image.data);
+    EXPECT_EQ(walk.d, usual.d);
+    EXPECT_EQ(walk.status.overflow, 0U);
 }
 
 // The record names the slower of two forms. A run corrects it for later runs and keeps its own.

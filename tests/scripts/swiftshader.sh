@@ -14,10 +14,12 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.3.0"}}\n' "$library" \
     >"$folder/icd.json"
-# To measure its passes takes it 40 s more. The checks take what GPUs begin with, the training what is the fastest here.
+# To measure its passes takes it 40 s more. The checks take what GPUs begin with, but the forms for large splats, and the
+# training takes what is the fastest here.
 on_swiftshader=(env "VK_DRIVER_FILES=$folder/icd.json" "VK_ICD_FILENAMES=$folder/icd.json" "XDG_CACHE_HOME=$folder")
 passes=blend=16x16,backward=team,loss=tiles,exp=polynomial
-"${on_swiftshader[@]}" "DARB_TUNE=scan=subgroup,scatter=ballot,$passes" "$darb" check >"$folder/check" || {
+large=depths=three,emit=slots,tiles=longest,sums=chunks plain=depths=four,emit=splats,tiles=rows,sums=splats
+"${on_swiftshader[@]}" "DARB_TUNE=scan=subgroup,scatter=ballot,$large,$passes" "$darb" check >"$folder/check" || {
     grep -B 3 FAIL "$folder/check" | head -60
     exit 1
 }
@@ -25,7 +27,7 @@ tail -n 1 "$folder/check"
 
 train() { "$@" train assets/scene -q --no-report -r 25 --iterations 50 --eval -o "$folder/$name" >/dev/null; }
 name=own train "$darb"
-name=swiftshader train "${on_swiftshader[@]}" "DARB_TUNE=scan=thread,scatter=columns,$passes" "$darb"
+name=swiftshader train "${on_swiftshader[@]}" "DARB_TUNE=scan=thread,scatter=columns,$plain,$passes" "$darb"
 python3 - "$folder" <<'PYTHON'
 import json, sys
 psnr = {name: json.load(open(f"{sys.argv[1]}/{name}/metrics.json"))["evaluations"][-1]["psnr_db"] for name in ("own", "swiftshader")}

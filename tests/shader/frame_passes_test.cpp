@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The small passes between projection and blending, each alone against the host: compact,
-// gather_counts, frame_groups, emit and tile_ranges.
+// gather_counts, frame_groups, emit and emit_slots, tile_ranges and tile_order.
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <numeric>
 
 #include "engine/core/rng.h"
@@ -41,11 +43,39 @@ TEST(Compact, visible_splats_keep_their_order) {
         }
         const GuardedBuffer flags(device, "visible", visible), offsets(device, "offset", offset),
             bounds(device, "bound", bound), key(device, "key", keys.size() * 4),
-            splat(device, "order", order.size() * 4);
-        run("compact", gpu::CompactArgs{n, 0.2f}, {flags, offsets, bounds, key, splat}, n);
+            splat(device, "order", order.size() * 4),
+            status(device, "status", std::vector<gpu::FrameStatus>(1));
+        run("compact", gpu::CompactArgs{n, 0.2f}, {flags, offsets, bounds, key, splat, status}, n);
         EXPECT_EQ(key.read<std::uint32_t>(), keys) << n;
         EXPECT_EQ(splat.read<std::uint32_t>(), order) << n;
         EXPECT_TRUE(key.intact() && splat.intact()) << n;
+    }
+}
+
+// Keys of 27 bits: the same order, and a flag where a depth is 65,536 times the near plane's.
+TEST(Compact, short_keys_keep_the_order_and_tell_of_depths_beyond_them) {
+    Device& device = shared_device();
+    const float reach = 0.2f * 65'536;
+    std::vector<glm::vec4> bound;
+    for (const float z :
+         {std::nextafter(0.2f, 1.0f), 0.3f, 1.0f, 7.0f, std::nextafter(reach, 0.0f)})
+        bound.emplace_back(0, 0, z, 0);
+    for (const bool deep : {false, true}) {
+        if (deep) bound.emplace_back(0, 0, reach, 0);
+        const auto n = static_cast<std::uint32_t>(bound.size());
+        Words offset(n);
+        std::iota(offset.begin(), offset.end(), 0U);
+        const GuardedBuffer flags(device, "visible", Words(n, 1)),
+            offsets(device, "offset", offset), bounds(device, "bound", bound),
+            key(device, "keys", n * 4), splat(device, "order", n * 4),
+            status(device, "status", std::vector<gpu::FrameStatus>(1));
+        run("compact", gpu::CompactArgs{n, 0.2f}, {flags, offsets, bounds, key, splat, status}, n,
+            {{"SHORT_KEYS", 1}});
+        const Words keys = key.read<std::uint32_t>();
+        EXPECT_TRUE(std::is_sorted(keys.begin(), keys.end()));
+        EXPECT_EQ(keys[0], 1U);
+        EXPECT_EQ(keys[4], (1U << SHORT_DEPTH_BITS) - 1);
+        EXPECT_EQ(status.read<gpu::FrameStatus>()[0].overflow, deep ? OVERFLOW_DEPTHS : 0U);
     }
 }
 
@@ -175,6 +205,35 @@ Emitted emit(const EmitInput& in, std::uint32_t capacity, bool cooperate = false
             status.read<gpu::FrameStatus>()[0]};
 }
 
+/// emit_slots.comp on the same input.
+Emitted emit_slots(const EmitInput& in, std::uint32_t capacity) {
+    Device& device = shared_device();
+    std::vector<gpu::FrameStatus> counts(1);
+    counts[0].visible = static_cast<std::uint32_t>(in.order.size());
+    counts[0].intersections = in.intersections;
+    const std::uint32_t stored = std::min(in.intersections, capacity);
+    const GuardedBuffer status(device, "status", counts), order(device, "order", in.order),
+        offset(device, "offset", in.offset), cover(device, "cover", in.frame.cover),
+        tile(device, "tile from intersection", capacity * 4),
+        splat(device, "splat from intersection", capacity * 4),
+        begin(device, "first intersection", in.frame.visible.size() * 4),
+        shape(device, "shape", in.frame.shape), bound(device, "bound", in.frame.bound),
+        in_use(device, "intersections in use", Words{stored});
+    run("emit_slots", gpu::IntersectionArgs{capacity, in.tiles_x, 0, 0},
+        {status, order, offset, cover, tile, splat, begin, shape, bound, in_use}, stored);
+    EXPECT_TRUE(tile.intact() && splat.intact() && begin.intact() && in_use.intact());
+    return {tile.read<std::uint32_t>(), splat.read<std::uint32_t>(), begin.read<std::uint32_t>(),
+            status.read<gpu::FrameStatus>()[0]};
+}
+
+void expect_same_emission(const EmitInput& in) {
+    const Emitted splats = emit(in, in.intersections), slots = emit_slots(in, in.intersections);
+    EXPECT_EQ(splats.tile, slots.tile);
+    EXPECT_EQ(splats.splat, slots.splat);
+    for (const std::uint32_t i : in.order) EXPECT_EQ(splats.begin[i], slots.begin[i]) << i;
+    EXPECT_EQ(std::memcmp(&splats.status, &slots.status, sizeof splats.status), 0);
+}
+
 const SceneOptions kEmitScene{.count = 120,
                               .width = 333,
                               .height = 210,
@@ -241,6 +300,59 @@ TEST(Emit, a_scene_without_huge_splats_counts_none) {
         ASSERT_LE(count, HUGE_INTERSECTIONS);
     EXPECT_EQ(emit(in, in.intersections).status.huge_splats, 0U);
     EXPECT_EQ(emit(in, in.intersections, true).splat, emit(in, in.intersections).splat);
+}
+
+// Up to cells of 8 x 5 tiles, cut by the picture's edge; one splat and thousands; 64 ranks in the
+// slots of one workgroup.
+TEST(Emit, a_thread_for_each_slot_writes_the_same_intersections) {
+    expect_same_emission(EmitInput(kEmitScene));
+    SceneOptions options = kEmitScene;
+    options.width = 900;
+    options.height = 620;
+    options.min_log_scale = -2.5;
+    options.max_log_scale = 1;
+    const EmitInput huge(options);
+    expect_same_emission(huge);
+    EXPECT_GT(emit_slots(huge, huge.intersections).status.huge_splats, 20U);
+    options.count = 1;
+    options.min_log_scale = 0.9;
+    expect_same_emission(EmitInput(options));
+    options = kEmitScene;
+    options.count = 9000;
+    options.min_log_scale = -9;
+    options.max_log_scale = -6;
+    const EmitInput small(options);
+    ASSERT_GT(small.order.size(), 64U * 64U) << "three rounds of the search";
+    EXPECT_LT(small.intersections, 2 * small.order.size());
+    expect_same_emission(small);
+}
+
+TEST(Emit, a_thread_for_each_slot_writes_no_more_than_there_is_room_for) {
+    const EmitInput in(kEmitScene);
+    const Emitted whole = emit(in, in.intersections);
+    for (const std::uint32_t capacity : {1U, 63U, 64U, 300U, in.intersections - 1}) {
+        const Emitted cut = emit_slots(in, capacity);  // guard words stand behind
+        EXPECT_TRUE(std::equal(cut.tile.begin(), cut.tile.end(), whole.tile.begin())) << capacity;
+        EXPECT_TRUE(std::equal(cut.splat.begin(), cut.splat.end(), whole.splat.begin()));
+    }
+}
+
+TEST(Emit, a_thread_for_each_slot_notes_a_total_beyond_32_bits) {
+    for (const bool last : {false, true}) {
+        EmitInput in(kEmitScene);
+        if (last) {
+            in.offset.back() = 0xffffff00U;
+            in.intersections = 0xffffff00U + 0x200U;  // wraps to 0x100
+        } else {
+            in.offset[50] = 5;
+        }
+        const Emitted out = emit_slots(in, 1000);
+        EXPECT_EQ(out.status.overflow, OVERFLOW_TOTAL) << last;
+        EXPECT_EQ(out.status.intersections, 0xffffffffU) << last;
+    }
+    EmitInput in(kEmitScene);  // offsets that neither grow nor begin at 0
+    for (size_t rank = 0; rank < in.offset.size(); ++rank) in.offset[rank] = rank % 2 ? 10 : 400;
+    EXPECT_EQ(emit_slots(in, 1000).status.overflow, OVERFLOW_TOTAL);
 }
 
 // The sum of the counts leaves 32 bits between two splats, or after the last one.
@@ -311,6 +423,46 @@ TEST(Emit, intersections_beyond_the_capacity_are_left_out) {
         const Emitted out = emit(in, capacity);  // guard words stand behind the capacity
         EXPECT_TRUE(std::equal(out.tile.begin(), out.tile.end(), all.tile.begin()));
         EXPECT_TRUE(std::equal(out.splat.begin(), out.splat.end(), all.splat.begin()));
+    }
+}
+
+/// Lists one after the other, with these lengths; the order of the tiles.
+Words tile_order(const Words& lengths) {
+    const auto tiles = static_cast<std::uint32_t>(lengths.size());
+    Words ranges;
+    for (std::uint32_t begin = 0; const std::uint32_t length : lengths) {
+        ranges.insert(ranges.end(), {begin, begin + length});
+        begin += length;
+    }
+    const Words before = ranges;
+    ranges.resize(std::size_t{tiles} * 4, 0);
+    const GuardedBuffer range(shared_device(), "tile range", ranges);
+    const Pipeline pipeline(shared_device(), "tile_order");
+    Commands commands(shared_device());
+    commands.begin();
+    commands.dispatch(pipeline, gpu::IntersectionArgs{1000, 1, tiles, 0}, {range}, 1);
+    commands.submit_and_wait();
+    EXPECT_TRUE(range.intact());
+    const Words after = range.read<std::uint32_t>();
+    EXPECT_TRUE(std::equal(before.begin(), before.end(), after.begin())) << "a range changed";
+    Words order;
+    for (std::size_t i = 0; i < tiles; ++i) order.push_back(after[2 * (tiles + i)]);
+    return order;
+}
+
+TEST(TileOrder, every_tile_comes_once_and_longer_lists_first) {
+    Pcg32 rng(17);
+    for (const std::uint32_t tiles : {1U, 255U, 256U, 7000U}) {
+        Words lengths(tiles);
+        for (std::uint32_t& length : lengths) length = rng.below(1U << rng.below(19));
+        const Words order = tile_order(lengths);
+        Words sorted = order;
+        std::sort(sorted.begin(), sorted.end());
+        for (std::uint32_t i = 0; i < tiles; ++i) ASSERT_EQ(sorted[i], i) << tiles;
+        for (std::uint32_t i = 1; i < tiles; ++i) {  // a class is a sixteenth wide
+            const std::uint32_t before = lengths[order[i - 1]], now = lengths[order[i]];
+            EXPECT_LE(now < 16 ? now : now - now / 16, before) << i << " of " << tiles;
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // project_backward.comp alone, with its gradients stored rather than applied, against the reference
-// for the same sums per intersection.
+// for the same sums per intersection; and partial_chunks.comp before it.
 #include "tests/support/backward_pass.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/every_kernel.h"
@@ -153,6 +153,129 @@ TEST(ProjectBackward, colours_clamped_at_zero_have_no_gradient) {
         for (size_t c = 0; c < 3; ++c) {
             EXPECT_EQ(d[kShDc][i * 3 + c] == 0, i == c) << "splat " << i << " channel " << c;
             EXPECT_EQ(d[kShRest][i * 9 + c] == 0, i == c) << "splat " << i << " channel " << c;
+        }
+}
+
+/// Splats with these numbers of intersections; their order of depth is not that of the file.
+Partials many_intersections(const std::vector<std::uint32_t>& counts) {
+    Partials p;
+    p.count = counts;
+    p.begin.resize(counts.size());
+    Pcg32 rng(91);
+    for (size_t k = 0; k < counts.size(); ++k) {
+        const size_t i = (k * 7 + 3) % counts.size();
+        p.begin[i] = static_cast<std::uint32_t>(p.intersections.size());
+        for (std::uint32_t e = 0; e < counts[i]; ++e)
+            for (float& sum : p.intersections.emplace_back())
+                sum = static_cast<float>(rng.uniform(-1, 1));
+    }
+    return p;
+}
+
+/// Intersections after partial_chunks.comp. rests: as RESTS; window: intersections of a binding, or
+/// 0 for all in one.
+std::vector<IntersectionPartials> add_chunks(const Partials& p, int kernel,
+                                             std::uint32_t window = 0, std::uint32_t overflow = 0) {
+    Device& device = shared_device();
+    SpecConstants constants = kernel_constants(kernel, Footprint::psi);
+    constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window);
+    const auto k = static_cast<std::uint32_t>(p.intersections.size());
+    std::vector<std::uint32_t> splats(k);
+    for (std::uint32_t i = 0; i < p.count.size(); ++i)
+        for (std::uint32_t e = 0; e < p.count[i]; ++e) splats[p.begin[i] + e] = i | 0xA0000000u;
+    std::vector<float> sums, rest, exponent;
+    for (const IntersectionPartials& one : p.intersections) {
+        sums.insert(sums.end(), one.begin(), one.begin() + 8);
+        rest.push_back(one[8]);
+        exponent.push_back(one[9]);
+    }
+    std::vector<gpu::FrameStatus> frame(1);
+    frame[0].overflow = overflow;
+    const GuardedBuffer status(device, "status", frame),
+        in_use(device, "in use", std::vector<std::uint32_t>{k}), splat(device, "splats", splats),
+        count(device, "count", p.count), first(device, "first", p.begin),
+        partials(device, "partials", sums), rests(device, "rest", rest),
+        exponents(device, "exponent", exponent);
+    std::vector<BufferRange> buffers{status, in_use, splat, count, first};
+    for (std::uint32_t w = 0; w < PARTIAL_WINDOWS; ++w) {
+        const std::uint64_t begin = std::uint64_t{w} * window * 32;
+        buffers.push_back(
+            window == 0 || begin >= sums.size() * 4
+                ? BufferRange(partials)
+                : BufferRange(partials.buffer(), GuardedBuffer::offset() + begin,
+                              std::min<std::uint64_t>(window * 32, sums.size() * 4 - begin)));
+    }
+    buffers.insert(buffers.end(), {rests, exponents});
+    const Pipeline pipeline(device, "partial_chunks", constants);
+    Commands commands(device);
+    commands.begin();
+    const Groups g = groups_for(k);
+    commands.dispatch(pipeline, NoArgs{}, buffers, g.x, g.y);
+    commands.submit_and_wait();
+    EXPECT_TRUE(partials.intact() && rests.intact() && exponents.intact());
+    sums = partials.read<float>();
+    rest = rests.read<float>();
+    exponent = exponents.read<float>();
+    std::vector<IntersectionPartials> after(k);
+    for (size_t e = 0; e < k; ++e) {
+        std::copy_n(sums.begin() + static_cast<std::ptrdiff_t>(8 * e), 8, after[e].begin());
+        after[e][8] = rest[e];
+        after[e][9] = exponent[e];
+    }
+    return after;
+}
+
+/// The same on the host, in the same order; values: 9, or 10 with a shape.
+std::vector<IntersectionPartials> chunks_in_order(const Partials& p, size_t values) {
+    std::vector<IntersectionPartials> after = p.intersections;
+    for (size_t i = 0; i < p.count.size(); ++i) {
+        if (p.count[i] <= SUM_CHUNK) continue;
+        for (std::uint32_t at = 0; at < p.count[i]; at += SUM_CHUNK)
+            for (size_t c = 0; c < values; ++c) {
+                std::array<float, 8> sums{};
+                for (std::uint32_t e = at; e < std::min(at + SUM_CHUNK, p.count[i]); ++e)
+                    sums[(e - at) % 8] += p.intersections[p.begin[i] + e][c];
+                float sum = sums[0];
+                for (size_t row = 1; row < 8; ++row) sum += sums[row];
+                after[p.begin[i] + at][c] = sum;
+            }
+    }
+    return after;
+}
+
+const std::vector<std::uint32_t> kManyCounts{1,  64, 65, 0,   66,  128, 129, 700, 3,
+                                             65, 65, 2,  192, 193, 63,  1,   500, 5};
+
+TEST(PartialChunks, chunks_of_large_splats_are_added_in_a_fixed_order) {
+    const Partials p = many_intersections(kManyCounts);
+    EXPECT_EQ(add_chunks(p, KERNEL_GAUSSIAN), chunks_in_order(p, 9));
+    EXPECT_EQ(add_chunks(p, KERNEL_BETA), chunks_in_order(p, 10));
+    EXPECT_NE(chunks_in_order(p, 9), p.intersections) << "there is nothing to add";
+}
+
+TEST(PartialChunks, windows_of_a_small_binding_hold_the_same_sums) {
+    const Partials p = many_intersections(kManyCounts);
+    ASSERT_LT(p.intersections.size(), 4 * 640U);
+    EXPECT_EQ(add_chunks(p, KERNEL_GAUSSIAN, 640), chunks_in_order(p, 9));
+}
+
+TEST(PartialChunks, a_frame_that_overflowed_is_left_alone) {
+    const Partials p = many_intersections(kManyCounts);
+    EXPECT_EQ(add_chunks(p, KERNEL_GAUSSIAN, 0, OVERFLOW_LISTS), p.intersections);
+}
+
+TEST(PartialChunks, gradients_from_chunks_match_double) {
+    const TestScene s = random_scene({.count = kManyCounts.size(), .seed = 59});
+    Partials p = many_intersections(kManyCounts);
+    const DoubleGradients expected = gradients_in_double(s.model, s.camera, 3, p);
+    p.intersections = add_chunks(p, KERNEL_GAUSSIAN);
+    const auto got = run_backward_pass(s.model, s.camera, 3, UPDATE_STORE, start_state(s.model), p,
+                                       {}, {}, {0.0f}, true)
+                         .d;
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (!expected.d[a].empty()) {
+            EXPECT_TRUE(compare_scaled(attribute_name(a), expected.d[a], got[a],
+                                       tolerance("project_gradient_float32")));
         }
 }
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_device_options.h"
@@ -49,9 +50,10 @@ struct SortRun {
     RadixSort sort;
     Buffer keys, values, count;
 
-    SortRun(std::uint32_t capacity, SortScatter strategy, std::uint32_t subgroup_size = 0)
+    SortRun(std::uint32_t capacity, SortScatter strategy, std::uint32_t subgroup_size = 0,
+            int digit_bits = RadixSort::kDigitBits)
         : offsets(device, strategy == SortScatter::ballot ? "scan=subgroup" : "scan=thread"),
-          sort(device, capacity, strategy, subgroup_size),
+          sort(device, capacity, strategy, subgroup_size, digit_bits),
           keys(device, "keys", (capacity + kGuardWords) * 4),
           values(device, "values", (capacity + kGuardWords) * 4),
           count(device, "count", 16) {}
@@ -173,6 +175,39 @@ TEST_P(RadixStrategies, every_subgroup_size_of_the_device_matches) {
         SortRun run(20'000, GetParam(), size);
         expect_sorted(run, make_keys("random", 20'000), 19'999, 32, std::to_string(size));
     }
+}
+
+TEST_P(RadixStrategies, digits_of_nine_bits_match) {
+    const DeviceInfo info = Device().info();
+    for (std::uint32_t size = info.min_subgroup_size; size <= info.max_subgroup_size; size *= 2) {
+        SortRun run(20'000, GetParam(), size, RadixSort::kWideDigitBits);
+        const Words keys = make_keys("random", 20'000);
+        for (const int bits : {1, 8, 9, 10, 18, 19, 26, 27, 28, 32})
+            expect_sorted(run, keys, 19'999, bits, std::to_string(bits) + " bits");
+    }
+}
+
+TEST_P(RadixStrategies, pairs_in_the_scratch_buffers_come_out_sorted) {
+    constexpr std::uint32_t kN = 20'000;
+    SortRun run(kN, GetParam(), 0, RadixSort::kWideDigitBits);
+    Pairs pairs{make_keys("random", kN), make_keys("sorted", kN)};
+    for (std::uint32_t& key : pairs.keys) key >>= 5;  // 27 bits
+    run.keys.upload(pairs.keys);
+    run.values.upload(pairs.values);
+    run.count.upload(Words{kN, 0, 0, 0});
+    run.commands.begin();
+    run.commands.copy(run.keys, run.sort.scratch_keys(), kN * 4);
+    run.commands.copy(run.values, run.sort.scratch_values(), kN * 4);
+    run.commands.fill(run.keys, kGuard);
+    run.commands.pass("sort");
+    run.sort.record_from_scratch(run.commands, run.keys, run.values, run.count, 0, 27);
+    run.commands.submit_and_wait();
+    const Pairs got{run.keys.download<std::uint32_t>(kN), run.values.download<std::uint32_t>(kN)};
+    EXPECT_TRUE(got == sorted_on_host(pairs, kN, 27));
+    EXPECT_TRUE(run.sort.is_odd(27));
+    EXPECT_FALSE(run.sort.is_odd(32));
+    EXPECT_THROW(run.sort.record_from_scratch(run.commands, run.keys, run.values, run.count, 0, 32),
+                 Error);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, RadixStrategies,

@@ -91,11 +91,12 @@ inline gpu::ProjectBackwardArgs backward_args(std::uint32_t splats, const AdamSt
 }
 
 /// Runs the pass once; update: UPDATE_*. Without Adam, gradient_sum receives what this view
-/// contributes.
+/// contributes. by_chunks: partial_chunks.comp has been over the partials.
 inline PassState run_backward_pass(const SplatModel& model, const Camera& camera, int sh_degree,
                                    int update, const PassState& before, const Partials& partials,
                                    const AdamStep& step = {}, const ProjectionEffects& effects = {},
-                                   const std::vector<float>& filters = {0.0f}) {
+                                   const std::vector<float>& filters = {0.0f},
+                                   bool by_chunks = false) {
     Device& device = shared_device();
     const auto n = static_cast<std::uint32_t>(model.size());
     SpecConstants constants = kernel_constants(model.kernel, model.footprint);
@@ -104,6 +105,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     constants["SH_STORED"] = model.sh_degree;
     constants["UPDATE"] = update;
     constants["REST"] = step.rest;
+    constants["SUMS_BY_CHUNKS"] = by_chunks ? 1 : 0;
     add_constants(effects, constants);
     const Pipeline pipeline(device, "project_backward", constants);
     std::vector<float> sums, rest, exponent;

@@ -472,7 +472,8 @@ namespace {
 constexpr int kScheduled = 7'000;  // iterations of the run that the steps are taken from
 constexpr int kYardstickViews = 2;
 constexpr int kFilledSide = 1'000;
-constexpr std::size_t kFilledSplats = 1'000'000;
+constexpr std::size_t kFilledSplats = 1'000'000, kTrainedSplats = 400'000;
+constexpr int kTrainedWidth = 1'595, kTrainedHeight = 1'064;  // px, as castle_p30
 
 struct TrainCase {
     const char* dataset;
@@ -526,15 +527,15 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     return result;
 }
 
-// Measures what tools/lab/gpu_model.py estimates, at rates so small that the scene does not change.
-BenchResult measure_filled(Device& device, const DeviceRates& rates, const BenchOptions& options) {
+// Steps on a made-up scene and photos of noise, at rates so small that the scene does not change.
+BenchResult measure_made(Device& device, const SplatModel& scene, const glm::ivec2& size,
+                         const DeviceRates& rates, const BenchOptions& options) {
     Dataset dataset;
     std::vector<ImageU8> photos;
     Pcg32 random(3, 100);
     for (const double x : {-0.01, 0.01}) {
-        dataset.views.push_back(
-            bench_view(bench_camera({x, 0, 4}, true, kFilledSide, kFilledSide), ""));
-        photos.emplace_back(kFilledSide, kFilledSide, 4);
+        dataset.views.push_back(bench_view(bench_camera({x, 0, 4}, true, size.x, size.y), ""));
+        photos.emplace_back(size.x, size.y, 4);
         for (std::uint8_t& value : photos.back().data)
             value = static_cast<std::uint8_t>(random.below(256));
     }
@@ -545,11 +546,11 @@ BenchResult measure_filled(Device& device, const DeviceRates& rates, const Bench
     train.sh_interval = 1;
     train.position_lr_init = train.position_lr_final = 1e-9f;
     train.scale_lr = train.rotation_lr = train.opacity_lr = train.sh_dc_lr = 1e-9f;
-    Trainer trainer(device, dataset, photos, filled_scene(kFilledSplats), train);
+    Trainer trainer(device, dataset, photos, scene, train);
     for (int i = 0; i < train.sh_degree; ++i) trainer.step();  // then all bands are in use
     BenchResult result = measure_steps(trainer, 2, options.sampling);
     result.counts.rest_floats = attribute_floats(kShRest, train.sh_degree);
-    result.counts.pixels = double(kFilledSide) * kFilledSide;
+    result.counts.pixels = double(size.x) * size.y;
     rate_passes(rates, result);
     return result;
 }
@@ -591,7 +592,8 @@ std::vector<BenchCase> train_cases(bool full) {
     std::vector<BenchCase> cases;
     for (const TrainCase& one :
          {TrainCase{"sceaux_castle_200_tiny", 0}, TrainCase{"sceaux_castle_800", 0},
-          TrainCase{"fox_800", full ? kScheduled : 1'000}}) {
+          TrainCase{"fox_800", full ? kScheduled : 1'000},
+          TrainCase{"castle_p30_1600", full ? kScheduled : 0}}) {
         std::string name = fmt::format("train/{}", one.dataset);
         if (one.after > 0) name += fmt::format("/after_{}", one.after);
         cases.push_back(
@@ -600,7 +602,17 @@ std::vector<BenchCase> train_cases(bool full) {
                  return measure(device, one, rates, options);
              }});
     }
-    cases.push_back({"train/filled_1M/1000x1000", "", measure_filled});
+    // What tools/lab/gpu_model.py estimates.
+    cases.push_back({"train/filled_1M/1000x1000", "",
+                     [](Device& device, const DeviceRates& rates, const BenchOptions& options) {
+                         return measure_made(device, filled_scene(kFilledSplats),
+                                             {kFilledSide, kFilledSide}, rates, options);
+                     }});
+    cases.push_back({fmt::format("train/trained_400k/{}x{}", kTrainedWidth, kTrainedHeight), "",
+                     [](Device& device, const DeviceRates& rates, const BenchOptions& options) {
+                         return measure_made(device, trained_scene(kTrainedSplats),
+                                             {kTrainedWidth, kTrainedHeight}, rates, options);
+                     }});
     return cases;
 }
 
@@ -640,7 +652,8 @@ BenchResult measure_choices(Device& device, const std::string& name, const Sampl
 
 std::vector<BenchCase> tuning_cases() {
     std::vector<BenchCase> cases;
-    for (const char* group : {"scan", "scatter", "blend", "backward"})
+    for (const char* group :
+         {"scan", "scatter", "depths", "emit", "tiles", "blend", "backward", "sums"})
         cases.push_back({fmt::format("tuning/{}", group), "",
                          [group](Device& device, const DeviceRates&, const BenchOptions& o) {
                              return measure_choices(device, group, o.sampling);
@@ -689,6 +702,39 @@ SplatModel filled_scene(std::size_t splats) {
             model.log_scale[3 * i + a] += std::log(1.75f);
             model.sh_dc[3 * i + a] = static_cast<float>(random.normal());
         }
+    }
+    return model;
+}
+
+// Fitted to castle_p30 as the defaults had it after 1,080 iterations at 800 px, in units of photos
+// 1,595 px wide: 102,536 splats, of which 24,000 to 39,000 are in a view. Their longest standard
+// deviation has a median of 9.5 px and a spread of 0.73 in logarithms, but 1 % lie above 81 px and
+// 0.1 % above 570. There 5 % of those in view are over more than 64 tiles, and three quarters of a
+// view's intersections are theirs; of 400,000 splats it is about half.
+SplatModel trained_scene(std::size_t splats) {
+    constexpr double fitted = 102'536, large = 1'000, share_seen = 0.3;
+    SplatModel model = random_scene(splats);
+    Pcg32 random(4, 100);
+    const double focal = 0.5 * kTrainedWidth / std::tan(0.125 * std::numbers::pi);
+    const double median = 9.5 * std::sqrt(fitted / static_cast<double>(splats));
+    const glm::dvec2 half =
+        glm::dvec2(kTrainedWidth, kTrainedHeight) / (2 * focal * std::sqrt(share_seen));
+    for (std::size_t i = 0; i < splats; ++i) {
+        const double distance = random.uniform(4, 8.5), normal = random.normal();
+        const double power = std::pow(std::max(random.uniform(0, 1), 0.008), -0.85);
+        const bool is_large = static_cast<double>(i) < large;
+        const double px = is_large ? 80 * power : median * std::exp(0.73 * normal);
+        const double longest = std::log(px * distance / focal);
+        const double second = longest - std::abs(1.22 + 0.9 * random.normal());
+        const double third = second - std::abs(0.69 + 0.5 * random.normal());
+        model.position[3 * i] = static_cast<float>(random.uniform(-half.x, half.x) * distance);
+        model.position[3 * i + 1] = static_cast<float>(random.uniform(-half.y, half.y) * distance);
+        model.position[3 * i + 2] = static_cast<float>(4 - distance);
+        model.log_scale[3 * i] = static_cast<float>(longest);
+        model.log_scale[3 * i + 1] = static_cast<float>(second);
+        model.log_scale[3 * i + 2] = static_cast<float>(third);
+        model.opacity_logit[i] =
+            static_cast<float>(-1.45 + 1.9 * (0.3 * normal + 0.954 * random.normal()));
     }
     return model;
 }

@@ -247,10 +247,11 @@ def record(root, darb):
 
 
 # The rows of the tables: what they begin with, and which of the compiled passes they show.
-ROWS = (("project, degree 3", r"^project \[.*SH_DEGREE=3"), ("emit", r"^emit \["),
+ROWS = (("project, degree 3", r"^project \[.*SH_DEGREE=3"), ("emit", r"^emit \["), ("emit, slots", r"^emit_slots "),
         ("radix scatter, ballot", r"^radix_scatter_ballot "), ("blend", r"^blend \["),
         ("blend backward, team", r"^blend_backward_team "),
         ("blend backward, one subgroup", r"^blend_backward \["), ("blend backward, buckets", r"^blend_backward_buckets "),
+        ("chunks of sums", r"^partial_chunks "),
         ("project backward + Adam, degree 3", r"^project_backward \[(?!.*UPDATE=).*SH_DEGREE=3"),
         ("loss by strips", r"^loss \["), ("loss by tiles, maps", r"^loss_maps "),
         ("loss by tiles, gradient", r"^loss_gradient "))

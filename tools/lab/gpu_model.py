@@ -5,10 +5,16 @@
     gpu_model.py PASSES.json [--gpu NAME]     PASSES.json: of `darb devices --passes --json`, or gpu_compilers.py run
     gpu_model.py --gpus                       the GPUs that it knows, and their rates
 
+    --trained                                 counts of a trained scene with some splats over the whole picture, in place
+                                              of those of the file
+    --backward FORM --emit FORM --sums FORM   forms of passes, as of darb's --tune; usual: those with which GPUs begin
+
 This is an estimate, not a measurement. Each pass takes the longest of three times: to issue its instructions, to move its
 bytes, and to process its longest tile by one workgroup. A launch for each dispatch and a wait for each barrier are added.
 Bytes, dispatches and barriers are those of the command; instructions are the compiler's. For a pass with loops over
-splats, LOOPS has the instructions of its loop for one splat and the pixels of a subgroup.
+splats, LOOPS has the instructions of its loop for one splat and the pixels of a subgroup. With --trained, a fourth time
+is that of the thread of project backward whose splat has the most tiles. Emit by splats is taken for one tile a splat: what
+its threads wait for the splats with many was not counted.
 """
 
 import argparse
@@ -27,6 +33,13 @@ GPUS = {
 }
 WAIT = 4.5                       # cycles
 LAUNCH_US, BARRIER_US = 1.5, 2.5
+# A round of a loop that waits for memory, cycles: what project backward took on the H200 for castle_p30, 0.58 ms, if one
+# thread walked the 6,700 tiles of a splat over the whole picture meanwhile.
+ROUND = 171
+# About the counts of `darb bench train/trained_400k`, by the areas of its ellipses; largest: tiles of the largest splat.
+TRAINED = {"splats": 123e3, "pixels": 1595 * 1064, "intersections": 1.3e6, "largest": 6700}
+SUM_CHUNK = 64   # shaders/shared/render_args.h
+SLOT_BYTES = 12  # what partial_chunks.comp reads of an intersection that it does not add
 REACHED_BYTES = 0.7  # share of the memory's rate that scattered accesses of 16 bytes and more reach
 TILE_PIXELS, TOUCHED = 256, 0.6  # share of a tile's blocks that a splat touches
 WALKED = 0.7  # share of these before all of a block's pixels are opaque
@@ -50,6 +63,26 @@ def instructions(report, shader):
     return max(rows) if rows else None
 
 
+def scaled(report, work):
+    """The report with other counts of splats, pixels and intersections, and bytes in proportion."""
+    old, of_splats = report["iteration"], ("project", "compact", "depth sort", "project backward")
+    rows = []
+    for row in old["passes"]:
+        of = "pixels" if row["pass"] == "loss" else "splats" if row["pass"] in of_splats else "intersections"
+        rows.append(row | {"bytes": row["bytes"] * work[of] / old[of]})
+    return report | {"iteration": old | work | {"passes": rows}}
+
+
+def largest_splat(name, work, clock, forms):
+    """Milliseconds of the thread that has the splat with the most tiles; 0 where a pass has none such."""
+    rounds = work.get("largest", 0)
+    if name != "project backward":
+        return 0
+    if forms["sums"] == "chunks" and rounds > SUM_CHUNK:
+        rounds = max(SUM_CHUNK, rounds / SUM_CHUNK)
+    return rounds * ROUND / (clock * 1e6)
+
+
 def blend_time(shader, work, gpu):
     """(issue, longest tile) in ms."""
     _, cores, rate, lanes, clock, _ = gpu
@@ -61,15 +94,18 @@ def blend_time(shader, work, gpu):
     return issue, longest * SUBGROUP_SERIAL[shader] * loop * WAIT / (clock * 1e6)
 
 
-def pass_time(report, work, row, gpu, backward):
+def pass_time(report, work, row, gpu, forms):
     """Milliseconds, and what limits the pass."""
     _, cores, rate, lanes, clock, memory = gpu
-    times = {"bytes": row["bytes"] / (memory * 1e6 * REACHED_BYTES)}
-    name = row["pass"]
+    name, backward = row["pass"], forms["backward"]
+    moved = row["bytes"]
+    if name == "project backward" and forms["sums"] == "chunks":
+        moved += work["intersections"] * SLOT_BYTES
+    times = {"bytes": moved / (memory * 1e6 * REACHED_BYTES), "largest splat": largest_splat(name, work, clock, forms)}
     if name in ("blend", "blend backward"):
         times["issue"], times["longest tile"] = blend_time(backward if name == "blend backward" else "blend", work, gpu)
     elif name in THREADS:
-        shader, of = THREADS[name]
+        shader, of = ("emit_slots", "intersections") if name == "emit" and forms["emit"] == "slots" else THREADS[name]
         threads = work["pixels"] * LOSS_ROWS if of == "strips" else work[of]
         count = instructions(report, shader)
         if count is not None:
@@ -79,27 +115,28 @@ def pass_time(report, work, row, gpu, backward):
     return times[limit] + zeroed * work["intersections"] * ZEROED_BYTES / (memory * 1e6 * REACHED_BYTES), limit
 
 
-def estimate(report, gpu, backward):
+def estimate(report, gpu, forms):
     """Rows (pass, ms, what limits it), followed by what launches and barriers take."""
     work = report["iteration"]
-    rows = [(row["pass"], *pass_time(report, work, row, gpu, backward)) for row in work["passes"]]
+    rows = [(row["pass"], *pass_time(report, work, row, gpu, forms)) for row in work["passes"]]
     waits = sum(row["dispatches"] * LAUNCH_US + row["barriers"] * BARRIER_US for row in work["passes"]) / 1e3
     return [*rows, ("launches and barriers", waits, "latency")]
 
 
 def chosen(report):
-    """The backward blend with which the device begins."""
+    """The forms with which the device begins."""
     shaders = {row["shader"] for row in report["passes"]}
-    return "blend_backward_team" if "blend_backward_team" in shaders and "llvmpipe" not in report["driver"] else "blend_backward"
+    team = "blend_backward_team" in shaders and "llvmpipe" not in report["driver"]
+    return {"backward": "blend_backward_team" if team else "blend_backward", "emit": "splats", "sums": "splats"}
 
 
-def print_estimate(report, names, backward):
+def print_estimate(report, names, forms):
     work = report["iteration"]
     print(f"One iteration, {work['splats']:,.0f} visible splats of degree 3, {work['pixels']:,.0f} pixels, "
           f"{work['intersections']:,.0f} intersections, ms (estimate):\n")
     print("| pass | " + " | ".join(GPUS[name][0] for name in names) + " |")
     print("|---" * (len(names) + 1) + "|")
-    columns = [estimate(report, GPUS[name], backward) for name in names]
+    columns = [estimate(report, GPUS[name], forms) for name in names]
     for cells in zip(*columns):
         print(f"| {cells[0][0]} | " + " | ".join(f"{ms:.2f}, {limit}" for _, ms, limit in cells) + " |")
     print("| all | " + " | ".join(f"{sum(row[1] for row in column):.1f}" for column in columns) + " |")
@@ -110,7 +147,10 @@ def main():
     parser.add_argument("passes", nargs="?")
     parser.add_argument("--gpu", action="append", choices=sorted(GPUS))
     parser.add_argument("--gpus", action="store_true")
+    parser.add_argument("--trained", action="store_true")
     parser.add_argument("--backward", choices=[name for name in LOOPS if name != "blend"])
+    parser.add_argument("--emit", choices=("splats", "slots"))
+    parser.add_argument("--sums", choices=("splats", "chunks"))
     flags = parser.parse_args()
     if flags.gpus:
         for key, (name, cores, rate, lanes, clock, memory) in GPUS.items():
@@ -121,7 +161,8 @@ def main():
     try:
         with open(flags.passes, encoding="utf-8") as file:
             report = json.load(file)
-        print_estimate(report, flags.gpu or list(GPUS), flags.backward or chosen(report))
+        forms = chosen(report) | {name: form for name in ("backward", "emit", "sums") if (form := getattr(flags, name))}
+        print_estimate(scaled(report, TRAINED) if flags.trained else report, flags.gpu or list(GPUS), forms)
     except (OSError, ValueError, KeyError) as error:
         print(f"gpu_model.py: {flags.passes}: {error!r}; make it with: darb devices --passes --json FILE", file=sys.stderr)
         return 2

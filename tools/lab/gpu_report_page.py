@@ -62,19 +62,11 @@ def predicted_and_measured(folder):
     if not case or not (folder / "passes.json").exists():
         return ""
     report = json.loads(read(folder / "passes.json"))
+    report = gpu_model.scaled(report, {"splats": case["visible"], "pixels": case["pixels"], "intersections": case["pairs"]})
     work = report["iteration"]
-    of_splats = ("project", "compact", "depth sort", "project backward")
-    for row in work["passes"]:
-        if row["pass"] == "loss":
-            row["bytes"] *= case["pixels"] / work["pixels"]
-        elif row["pass"] in of_splats:
-            row["bytes"] *= case["visible"] / work["splats"]
-        else:
-            row["bytes"] *= case["pairs"] / work["intersections"]
     work["passes"] = [row for row in work["passes"] if row["pass"] in ms]
-    work |= {"splats": case["visible"], "pixels": case["pixels"], "intersections": case["pairs"]}
-    backward = gpu_model.chosen(report)
-    columns = {key: dict((name, time) for name, time, _ in gpu_model.estimate(report, gpu, backward))
+    forms = gpu_model.chosen(report)
+    columns = {key: dict((name, time) for name, time, _ in gpu_model.estimate(report, gpu, forms))
                for key, gpu in gpu_model.GPUS.items()}
     rows = [(name, f"{ms[name]:.3f}", *(f"{columns[key][name]:.3f}" for key in columns)) for name in ms if name in columns["h200"]]
     rows.append(("all", f"{sum(ms.values()):.3f}", *(f"{sum(columns[key].values()):.3f}" for key in columns)))

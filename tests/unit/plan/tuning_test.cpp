@@ -164,6 +164,20 @@ TEST(Tuning, a_run_that_blends_by_records_says_so_and_keeps_it) {
     EXPECT_FALSE(resumed_tuning(device.info(), records, "backward=subgroup", "file").blend_records);
 }
 
+TEST(Tuning, a_run_that_sums_by_chunks_says_so_and_keeps_it) {
+    Device& device = shared_device();
+    EXPECT_EQ(result_tuning(device).find("sums"), std::string::npos);
+    const ScopedVariants some(device, "sums=chunks,depths=three,emit=slots,tiles=longest");
+    EXPECT_TRUE(device.tuning().short_depths && device.tuning().emit_by_slots &&
+                device.tuning().longest_first);
+    const std::string text = result_tuning(device);
+    EXPECT_NE(text.find("sums=chunks"), std::string::npos) << text;
+    EXPECT_EQ(text.find("emit"), std::string::npos) << text;
+    EXPECT_TRUE(resumed_tuning(device.info(), device.tuning(), text, "file").sums_by_chunks);
+    EXPECT_FALSE(
+        resumed_tuning(device.info(), device.tuning(), "backward=subgroup", "file").sums_by_chunks);
+}
+
 TEST(Tuning, a_device_runs_its_defaults_until_it_is_told_otherwise) {
     Device& device = shared_device();
     EXPECT_EQ(device.tuning(), usual_tuning(device.info()));
