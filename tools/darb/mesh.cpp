@@ -420,6 +420,10 @@ void check_output(const MeshFlags& flags) {
         flags.output.extension().empty())
         throw Error(flags.output.string(), "has no ending of a mesh",
                     "Use " + mesh_endings() + ".");
+    if (flags.method == "opacity" && flags.reading == "expected")
+        throw Error("--depth expected",
+                    "is a mean of depths, and says of no point what is before it",
+                    "Use --depth front, solid or plane with --method opacity.");
     if (has_pages(flags.mesh.texture) && has_extension(flags.output, ".ply"))
         throw Error(flags.output.string(), "a .ply has no place for a texture",
                     "Write .glb, .gltf or .obj, or take --texture vertex.");
@@ -464,6 +468,13 @@ struct OptionGroups {
 };
 
 void add_surface_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
+    groups.surface.push_back(
+        c.add_option("--method", flags.method,
+                     "tsdf: the mean of the views' distances; opacity: where the opacity of the "
+                     "space passes 1 - level, which keeps thin things and takes longer")
+            ->capture_default_str()
+            ->check(CLI::IsMember(
+                std::vector<std::string>(std::begin(kMeshMethods), std::end(kMeshMethods)))));
     groups.surface.push_back(
         c.add_option(
              "--depth", flags.reading,
