@@ -73,6 +73,10 @@ SceneMeshOptions take_options(const py::dict& options, const glm::dvec3& origin)
     if (!reading)
         throw Error("depth " + depth, "no such reading", "Use front, solid, plane or expected.");
     o.reading = *reading;
+    const std::string named = take_text(options["method"], "method");
+    const auto method = mesh_method_from_name(named);
+    if (!method) throw Error("method " + named, "no such method", "Use tsdf or opacity.");
+    o.method = *method;
     const std::string texture = take_text(options["texture"], "texture");
     const auto texturing = mesh_texturing_from_name(texture);
     if (!texturing)
