@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/core/quantile.h"
 #include "engine/core/text.h"
 #include "engine/data/camera_list.h"

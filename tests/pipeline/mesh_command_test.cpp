@@ -249,6 +249,37 @@ TEST(MeshCommand, Paints_pages_with_photos) {
               0.02 * double(read_json(report)["faces"]));
 }
 
+TEST(MeshCommand, Undoes_the_exposures_that_the_run_learned) {
+    const fs::path run = scratch() / "run";
+    fs::create_directories(run);
+    fs::copy_file(ball_file(), run / "ball.ply", fs::copy_options::overwrite_existing);
+    write_file_atomic(run / "run.jsonl", "{\"event\": \"start\"}\n");
+    // Photos are half as bright as what the splats learned, and red is lifted.
+    nlohmann::json maps = nlohmann::json::object();
+    std::set<std::array<int, 3>> undone;
+    for (int i = 0; i < kAround; ++i) {
+        maps[fmt::format("images/view_{:02}.png", i)] = {
+            {0.5, 0.0, 0.0, 0.02}, {0.0, 0.5, 0.0, 0.0}, {0.0, 0.0, 0.5, 0.0}};
+        const glm::u8vec3 c = photo_colour(i);
+        const auto back = [](double value) { return int(std::min(value, 255.0) + 0.5); };
+        undone.insert({back(2 * std::max(c.x - 5.1, 0.0)), back(2.0 * c.y), back(2.0 * c.z)});
+    }
+    write_file_atomic(run / "exposure.json", maps.dump());
+    const std::string command =
+        fmt::format("mesh '{}' --cameras '{}' -o '{}' --voxel 0.1 --texel 0.02 --texture photos",
+                    (run / "ball.ply").string(), data_set(), scratch_file("exposed.obj"));
+    const Outcome o = darb(command);
+    ASSERT_EQ(o.code, 0) << o.err;
+    std::size_t photos = 0, others = 0;
+    for (const auto& [colour, texels] : colours_of({scratch_file("exposed_0.png")}))
+        if (colour != std::array{0, 0, 0}) (undone.count(colour) ? photos : others) += texels;
+    EXPECT_LT(double(others), 0.1 * double(photos)) << "gutters where two photos meet";
+    write_file_atomic(run / "exposure.json", R"({"view_00.png": [[1, 0]]})");
+    const Outcome damaged = darb(command);
+    EXPECT_EQ(damaged.code, 2);
+    EXPECT_NE(damaged.err.find("exposure.json"), std::string::npos) << damaged.err;
+}
+
 TEST(MeshCommand, Paints_pages_with_the_splats_colours) {
     for (const char* name : {"splats.glb", "splats.gltf"})
         ASSERT_EQ(darb(mesh_of(name, "--texture splats --texel 0.02")).code, 0);

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""How near surfaces out of splats are to the truth, by kernel and by reading of the depth: docs/experiments/surfaces.md.
+"""How near surfaces out of splats are to the truth, by kernel and by reading of the depth.
 
-    surface_table.py run OUT [--iterations N] [--seeds N]    makes the generated scenes, and trains, reads and meshes each kernel
+    surface_table.py run OUT [--seeds N]    makes the generated scenes, and trains, reads and meshes each kernel
     surface_table.py show OUT                                prints the tables of the page
 
 A run of OUT/results.json is not made again, so a call that was stopped goes on where it ended. Seeds come last: one seed
@@ -26,9 +26,9 @@ KERNELS = ["gaussian", "raised_cosine", "half_cosine_squared", "sinc", "inverse_
 READINGS = ["front", "solid", "line", "plane", "expected"]
 # How each scene is made, and its mesh: voxel and thresholds in world units, and the box that the reference has points in.
 SCENES = {
-    "still_life": {"photos": ["depths", "PHOTOS"], "truth": ["surface", "TRUTH"], "step": 4, "voxel": 0.04,
+    "still_life": {"photos": ["depths", "PHOTOS"], "truth": ["surface", "TRUTH"], "step": 4, "iterations": 400, "voxel": 0.04,
                    "thresholds": [0.028, 0.056], "bounds": "-2.6,-2.6,-0.2,2.6,2.6,3"},
-    "town": {"photos": ["town-depths", "PHOTOS", "6", "0.6"], "truth": ["town-surface", "TRUTH", "6"], "step": 2, "voxel": 0.1,
+    "town": {"photos": ["town-depths", "PHOTOS", "6", "0.6"], "truth": ["town-surface", "TRUTH", "6"], "step": 2, "iterations": 1600, "voxel": 0.1,
              "thresholds": [0.085, 0.17], "bounds": "-15,-15,-1,15,15,5"},
 }
 
@@ -59,8 +59,9 @@ def make_scenes(out):
             part.rename(folder)
 
 
-def measure(out, name, kernel, seed, iterations):
+def measure(out, name, kernel, seed):
     scene, run, photos = SCENES[name], out / "run", out / f"{name}_photos"
+    iterations = scene["iterations"]
     shutil.rmtree(run, ignore_errors=True)
     _, training = call(program("darb"), "train", str(photos), "-o", str(run), "--kernel", kernel, "--seed", str(seed),
                        "--iterations", str(iterations), "--eval", "-q")
@@ -81,7 +82,7 @@ def results_of(out):
     return json.loads(path.read_text()) if path.exists() else []
 
 
-def run(out, iterations, seeds):
+def run(out, seeds):
     out.mkdir(parents=True, exist_ok=True)
     make_scenes(out)
     for seed in range(seeds):
@@ -90,7 +91,7 @@ def run(out, iterations, seeds):
                 results = results_of(out)
                 if any((r["scene"], r["kernel"], r["seed"]) == (name, kernel, seed) for r in results):
                     continue
-                results.append(measure(out, name, kernel, seed, iterations))
+                results.append(measure(out, name, kernel, seed))
                 part = out / "results.part"
                 part.write_text(json.dumps(results, indent=1) + "\n")
                 part.rename(out / "results.json")
@@ -136,11 +137,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=["run", "show"])
     parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("--iterations", type=int, default=400)
     parser.add_argument("--seeds", type=int, default=3)
     arguments = parser.parse_args()
     if arguments.what == "run":
-        run(arguments.out, arguments.iterations, arguments.seeds)
+        run(arguments.out, arguments.seeds)
     show(arguments.out)
 
 
