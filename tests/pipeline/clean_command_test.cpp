@@ -15,9 +15,9 @@
 namespace darb::test {
 namespace {
 
-constexpr std::size_t kBall = 800, kFar = 12, kHaze = 5;
+constexpr std::size_t kBallSplats = 800, kFarSplats = 12, kHazeSplats = 5;
 
-void add_splat(const glm::dvec3& at, double size, float opacity_logit, SplatModel& m) {
+void put_clutter(const glm::dvec3& at, double size, float opacity_logit, SplatModel& m) {
     for (int c = 0; c < 3; ++c) {
         m.position.push_back(static_cast<float>(at[c]));
         m.log_scale.push_back(static_cast<float>(std::log(size)));
@@ -28,19 +28,21 @@ void add_splat(const glm::dvec3& at, double size, float opacity_logit, SplatMode
 }
 
 /// A ball of radius 1 at the origin, a small cluster at y = -4, and haze over the ball.
-std::string scene_file() {
+std::string cluttered_scene() {
     SplatModel m;
     Pcg32 rng(4);
-    for (std::size_t i = 0; i < kBall; ++i)
-        add_splat(glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal())), 0.08, 3, m);
-    for (std::size_t i = 0; i < kFar; ++i) add_splat({0.01 * double(i), -4, 0}, 0.03, 3, m);
-    for (std::size_t i = 0; i < kHaze; ++i) add_splat({0.3 * double(i) - 0.6, 0, -1}, 0.7, -3.5, m);
+    for (std::size_t i = 0; i < kBallSplats; ++i)
+        put_clutter(glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal())), 0.08, 3,
+                    m);
+    for (std::size_t i = 0; i < kFarSplats; ++i) put_clutter({0.01 * double(i), -4, 0}, 0.03, 3, m);
+    for (std::size_t i = 0; i < kHazeSplats; ++i)
+        put_clutter({0.3 * double(i) - 0.6, 0, -1}, 0.7, -3.5, m);
     const fs::path path = scratch() / "cluttered.ply";
     write_ply(path, m);
     return path.string();
 }
 
-std::string cameras_file() {
+std::string cameras_before_clutter() {
     nlohmann::json list = nlohmann::json::array();
     for (int i = 0; i < 4; ++i)
         list.push_back({{"id", i},
@@ -57,12 +59,12 @@ std::string cameras_file() {
 }
 
 TEST(CleanCommand, Leaves_out_isolated_parts_where_no_rule_is_named) {
-    const Outcome o = darb(fmt::format("clean '{}' -o '{}' --json '{}'", scene_file(),
+    const Outcome o = darb(fmt::format("clean '{}' -o '{}' --json '{}'", cluttered_scene(),
                                        scratch_file("clean.ply"), scratch_file("clean.json")));
     ASSERT_EQ(o.code, 0) << o.err;
-    EXPECT_EQ(load_splats(scratch_file("clean.ply")).size(), kBall + kHaze);
+    EXPECT_EQ(load_splats(scratch_file("clean.ply")).size(), kBallSplats + kHazeSplats);
     const nlohmann::json report = read_json(scratch_file("clean.json"));
-    EXPECT_EQ(report["together"]["splats"], kFar);
+    EXPECT_EQ(report["together"]["splats"], kFarSplats);
     EXPECT_GT(report["together"]["light_share"], 0.0);
     EXPECT_LT(report["together"]["light_share"], 0.02);
 }
@@ -72,21 +74,21 @@ TEST(CleanCommand, Shows_what_each_rule_would_take_and_writes_nothing) {
     const Outcome o = darb(fmt::format(
         "clean '{}' --dry-run --cameras '{}' --isolated 0.01 --haze 0.1,5 --free-space 3 "
         "--few-views 2 --region sphere:0,0,0,1.5 --json '{}'",
-        scene_file(), cameras_file(), json));
+        cluttered_scene(), cameras_before_clutter(), json));
     ASSERT_EQ(o.code, 0) << o.err;
     const nlohmann::json report = read_json(json);
     std::map<std::string, std::size_t> taken;
     for (const auto& rule : report["rules"]) taken[rule["rule"]] = rule["splats"];
-    EXPECT_EQ(taken["isolated parts"], kFar);
-    EXPECT_EQ(taken["outside the region"], kFar);
-    EXPECT_EQ(taken["haze"], kHaze);
+    EXPECT_EQ(taken["isolated parts"], kFarSplats);
+    EXPECT_EQ(taken["outside the region"], kFarSplats);
+    EXPECT_EQ(taken["haze"], kHazeSplats);
     EXPECT_EQ(taken["in free space"], 0u) << "haze touches the ball";
-    EXPECT_EQ(report["together"]["splats"], kFar + kHaze + taken["seen by few"]);
+    EXPECT_EQ(report["together"]["splats"], kFarSplats + kHazeSplats + taken["seen by few"]);
     EXPECT_EQ(report["output"], "");
 }
 
 TEST(CleanCommand, Says_what_is_wrong) {
-    const std::string scene = scene_file();
+    const std::string scene = cluttered_scene();
     const auto refused = [&](const std::string& more, const std::string& words) {
         const Outcome o = darb("clean '" + scene + "' " + more);
         EXPECT_EQ(o.code, 2) << more;

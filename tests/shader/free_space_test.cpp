@@ -12,7 +12,7 @@
 namespace darb::test {
 namespace {
 
-void add_splat(const glm::dvec3& at, double size, float opacity_logit, SplatModel& m) {
+void put_splat_in_room(const glm::dvec3& at, double size, float opacity_logit, SplatModel& m) {
     for (int c = 0; c < 3; ++c) {
         m.position.push_back(static_cast<float>(at[c]));
         m.log_scale.push_back(static_cast<float>(std::log(size)));
@@ -23,7 +23,7 @@ void add_splat(const glm::dvec3& at, double size, float opacity_logit, SplatMode
 }
 
 /// At x, 0, 0, looking along z.
-Camera camera_at(double x) {
+Camera camera_in_room(double x) {
     Camera c;
     c.width = 160;
     c.height = 120;
@@ -34,7 +34,7 @@ Camera camera_at(double x) {
     return c;
 }
 
-struct Room {
+struct RoomWithFloaters {
     SplatModel model;
     std::size_t faint = 0, dense = 0, behind = 0;  // the first splats of each kind
     std::vector<Camera> cameras;
@@ -42,25 +42,25 @@ struct Room {
 
 /// An opaque wall at z = 5; faint splats halfway to it, an opaque ball there, and splats behind the
 /// wall.
-Room room() {
-    Room r;
+RoomWithFloaters room_with_floaters() {
+    RoomWithFloaters r;
     Pcg32 rng(3);
     for (int i = 0; i < 3000; ++i)
-        add_splat({8 * rng.uniform() - 4, 6 * rng.uniform() - 3, 5}, 0.12, 4, r.model);
+        put_splat_in_room({8 * rng.uniform() - 4, 6 * rng.uniform() - 3, 5}, 0.12, 4, r.model);
     r.faint = r.model.size();
-    for (int i = 0; i < 6; ++i) add_splat({0.3 * i - 0.75, 0.4, 2.5}, 0.05, -2.5, r.model);
+    for (int i = 0; i < 6; ++i) put_splat_in_room({0.3 * i - 0.75, 0.4, 2.5}, 0.05, -2.5, r.model);
     r.dense = r.model.size();
     for (int i = 0; i < 300; ++i) {
         const glm::dvec3 way(rng.normal(), rng.normal(), rng.normal());
-        add_splat(glm::dvec3(0, -0.4, 2.5) + 0.15 * glm::normalize(way), 0.03, 4, r.model);
+        put_splat_in_room(glm::dvec3(0, -0.4, 2.5) + 0.15 * glm::normalize(way), 0.03, 4, r.model);
     }
     r.behind = r.model.size();
-    for (int i = 0; i < 5; ++i) add_splat({0.3 * i - 0.6, 0, 8}, 0.05, -2.5, r.model);
-    for (int v = 0; v < 5; ++v) r.cameras.push_back(camera_at(0.2 * v - 0.4));
+    for (int i = 0; i < 5; ++i) put_splat_in_room({0.3 * i - 0.6, 0, 8}, 0.05, -2.5, r.model);
+    for (int v = 0; v < 5; ++v) r.cameras.push_back(camera_in_room(0.2 * v - 0.4));
     return r;
 }
 
-SplatSet found(const Room& r, const FreeSpaceOptions& options = {}) {
+SplatSet found_in_space(const RoomWithFloaters& r, const FreeSpaceOptions& options = {}) {
     Renderer renderer(shared_device(), r.model);
     FreeSpace space(r.model, options);
     for (const Camera& camera : r.cameras) space.ask(renderer, camera);
@@ -68,31 +68,31 @@ SplatSet found(const Room& r, const FreeSpaceOptions& options = {}) {
 }
 
 TEST(FreeSpace, is_before_a_surface_and_faint) {
-    const Room r = room();
-    const SplatSet set = found(r);
+    const RoomWithFloaters r = room_with_floaters();
+    const SplatSet set = found_in_space(r);
     for (std::size_t i = 0; i < r.model.size(); ++i)
         EXPECT_EQ(set[i], i >= r.faint && i < r.dense ? 1 : 0) << i;
     FreeSpaceOptions more;
     more.least_views = 6;  // than there are cameras
-    EXPECT_EQ(count_of(found(r, more)), 0u);
+    EXPECT_EQ(count_of(found_in_space(r, more)), 0u);
 }
 
 // A single camera finds a surface where two faint splats take a quarter of its light together.
 TEST(FreeSpace, ends_where_enough_light_is_taken) {
-    Room r = room();
-    for (int i = 0; i < 6; ++i) add_splat({0.3 * i - 0.75, 0.4, 2.5}, 0.05, -1, r.model);
+    RoomWithFloaters r = room_with_floaters();
+    for (int i = 0; i < 6; ++i) put_splat_in_room({0.3 * i - 0.75, 0.4, 2.5}, 0.05, -1, r.model);
     FreeSpaceOptions sparing;
     sparing.taken = 0.2;
-    const SplatSet set = found(r, sparing);
+    const SplatSet set = found_in_space(r, sparing);
     for (std::size_t i = r.faint; i < r.dense; ++i) EXPECT_EQ(set[i], 0) << i;
-    EXPECT_EQ(count_of(found(r)), 12u);
+    EXPECT_EQ(count_of(found_in_space(r)), 12u);
 }
 
 TEST(FreeSpace, scales_wide_cameras_down) {
-    const Room r = room();
+    const RoomWithFloaters r = room_with_floaters();
     FreeSpaceOptions narrow;
     narrow.width = 80;
-    const SplatSet set = found(r, narrow);
+    const SplatSet set = found_in_space(r, narrow);
     for (std::size_t i = r.faint; i < r.dense; ++i) EXPECT_EQ(set[i], 1) << i;
 }
 
