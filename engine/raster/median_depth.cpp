@@ -16,9 +16,9 @@ namespace darb {
 namespace {
 
 constexpr std::uint32_t kBlocksOfTile = 4, kBlockPixels = 64;
-// The first walks over a list take a block's pixels together, the others those that are left.
-constexpr std::uint32_t kWideWalks = 2, kWalks = 8, kWideSamples = 8;
-constexpr std::uint32_t kMostRays = 8;  // of a thread in a wide walk
+constexpr std::uint32_t kWalks = 7;                              // each leaves a ninth of a bracket
+constexpr std::int32_t kSplatsOnCpu = 2048, kSplatsOnGpu = 512;  // of a block, in shared memory
+constexpr std::uint32_t kMostRays = 8;                           // points of a thread
 
 std::uint64_t pixel_bytes(std::uint32_t segments) {
     const std::uint64_t products = segments > 1 ? MEDIAN_SAMPLES * sizeof(float) : 0;
@@ -133,9 +133,11 @@ MedianDepth::MedianDepth(Device& device, const ForwardOptions& options, DepthRea
     SpecConstants shared = ray_constants(device, options, reading);
     const std::uint32_t subgroup = blend_subgroup(device);
     bracket_pass_ = Pipeline(device, "depth_bracket", shared, true, subgroup);
-    shared["PIXELS"] = static_cast<std::int32_t>(std::min(kBlockPixels / subgroup, kMostRays));
-    shared["SAMPLES"] = static_cast<std::int32_t>(kWideSamples);
-    wide_walk_ = Pipeline(device, "median_depth", shared, true, subgroup);
+    // A CPU has room for the splats of any block but the fullest; on a GPU they would keep others
+    // out.
+    SpecConstants search = shared;
+    search["BLOCK_SPLATS"] = device.info().type == "cpu" ? kSplatsOnCpu : kSplatsOnGpu;
+    search_ = Pipeline(device, "median_search", search, true, subgroup);
     shared["PIXELS"] = 1;
     shared["SAMPLES"] = static_cast<std::int32_t>(MEDIAN_SAMPLES);
     walk_ = Pipeline(device, "median_depth", shared, true, subgroup);
@@ -174,17 +176,17 @@ void MedianDepth::record(Commands& commands, const GpuSplats& splats, const Fram
                                      bracket_,
                                      ends_,
                                      depth_};
-    const auto walk = [&](const Pipeline& pipeline, std::uint32_t number) {
-        for (std::uint32_t segment = 0; segment < segments; ++segment)
-            commands.dispatch(
-                pipeline,
-                gpu::MedianDepthArgs{camera.width, camera.height, camera.tiles_x, level,
-                                     camera.near_plane, segment, segments, number},
-                buffers, camera.tiles_x, camera.tiles_y, kBlocksOfTile);
+    const auto walk = [&](const Pipeline& pipeline, std::uint32_t parts) {
+        for (std::uint32_t part = 0; part < parts; ++part)
+            commands.dispatch(pipeline,
+                              gpu::MedianDepthArgs{camera.width, camera.height, camera.tiles_x,
+                                                   level, camera.near_plane, part, parts},
+                              buffers, camera.tiles_x, camera.tiles_y, kBlocksOfTile);
     };
-    walk(bracket_pass_, 0);
+    walk(bracket_pass_, segments);
+    if (longest_list <= LIST_SEGMENT) walk(search_, 1);
     buffers.emplace_back(product_);
-    for (std::uint32_t w = 0; w < kWalks; ++w) walk(w < kWideWalks ? wide_walk_ : walk_, w);
+    for (std::uint32_t w = 0; w < kWalks; ++w) walk(walk_, segments);
 }
 
 PointLight::PointLight(Device& device, const ForwardOptions& options, DepthReading reading)

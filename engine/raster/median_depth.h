@@ -75,7 +75,7 @@ class MedianDepth {
 
     Device* device_;
     DepthPlanes planes_;
-    Pipeline bracket_pass_, wide_walk_, walk_;
+    Pipeline bracket_pass_, search_, walk_;
     Buffer bracket_, ends_, product_, depth_;
 };
 

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The depth at which a share `level` of a pixel's light is left. T(z) is the product, over the splats that the picture
-// drew, of what each leaves of the light up to z: it never rises, so D, the least z with T(z) <= level, is unique.
-// A splat's slice along the ray is its own profile (forward/ray_slice.glsl), and READING says how much of it counts at z
-// (shared/depth_args.h); every reading ends at 1 - alpha.
-// Place: after depth_bracket.comp, a few times. Source: docs/math.md, Depth of a surface.
+// The depths that median_search.comp has not found: by walks over the list, each of which tests SAMPLES depths of a pixel
+// and keeps the part of its bracket in which T passes the level.
+// Place: after median_search.comp, a few times. Source: docs/math.md, Depth of a surface.
 // Work: a workgroup is a subgroup and has a block of 8 x 8 pixels. It packs those whose depth is not found yet, takes
 // PIXELS of them a thread at a time, and walks the list once for these, testing SAMPLES depths of each. Shared memory:
 // the packed pixels and the lists of lib/hits.glsl; no barrier. Reads lists and projected splats; reads and writes
@@ -25,8 +23,7 @@ shared uint open_pixel[BLOCK_PIXELS];  // slots in the tile
 
 // Where a walk is the last of a pixel: float32 holds no more within the bracket, or the light falls in it as it does in
 // its neighbours, by less than this.
-const float LEAST_STEP = 1e-5, EVEN_FALL = 1e-4, EVEN_STEP = 1e-5;
-const float CLUSTER = 0.4;  // of a bracket whose ends are known: where around the line between them samples lie
+const float EVEN_FALL = 1e-4, EVEN_STEP = 1e-5;
 
 uint find_open(uint block) {
     order_within_subgroup();
@@ -49,18 +46,6 @@ uint find_open(uint block) {
 uint pixel_at(uint place, out uvec2 at) {
     at = gl_WorkGroupID.xy * TILE_SIZE + slot_to_pixel(open_pixel[place]);
     return at.y * args.width + at.x;
-}
-
-// Samples are spread over the bracket, or lie around where the line between its ends passes the level.
-void place_samples(vec4 b, out float first, out float step) {
-    const float width = b.y - b.x;
-    step = width / float(SAMPLES + 1u);
-    first = b.x + step;
-    if (READING == DEPTH_READING_PLANE || args.walk != 1u || !(b.w >= 0.0)) return;
-    step = width * (CLUSTER / float(SAMPLES));
-    const float middle = b.x + width * (b.z - args.level) / max(b.z - b.w, 1e-6);
-    const float span = float(SAMPLES - 1u) * step;
-    first = clamp(middle - 0.5 * span, b.x, b.y - span);
 }
 
 // The part of the bracket in which T passes the level, and D there. The fall of T within it, and half the difference
@@ -109,7 +94,8 @@ void search(uint place, uint count, uvec2 range, uint bits) {
         uvec2 at;
         const uint pixel = pixel_at(min(mine, count - 1u), at);
         const vec4 b = bracket[pixel];
-        place_samples(b, px.first[k], px.step[k]);
+        px.step[k] = (b.y - b.x) / float(SAMPLES + 1u);
+        px.first[k] = b.x + px.step[k];
         px.centre[k] = vec2(at) + 0.5;
         px.end[k] = mine < count ? list_end[pixel] : 0u;
         farthest = max(farthest, b.y);

@@ -8,4 +8,5 @@ layout(set = 0, binding = 9, scalar) buffer End { uint list_end[]; };         //
 layout(set = 0, binding = 10, scalar) buffer DepthOut { vec2 depth_out[]; };  // [H][W] depth, 0: no surface; opacity
 
 const vec4 NO_BRACKET = vec4(1.0, 0.0, 1.0, 1.0);  // the depth is found, or there is no surface
+const float LEAST_STEP = 1e-5;                     // of the depth: float32 holds no more within a bracket
 const float UNKNOWN_LIGHT = -1.0;                  // at the end of a bracket that no walk has tested

@@ -50,10 +50,9 @@ struct RaySplat {
     uint number;
 };
 
-RaySplat load_hit(uint hit) {
+RaySplat load_ray_splat(uint splat, uint number) {
     RaySplat s;
-    const uint splat = hit_splat[hits_base() + hit];
-    s.number = hit_index[hits_base() + hit];
+    s.number = number;
     s.shape = load_shape(splat, s.l22);
     s.opacity = load_light(splat).w;
     s.exponent = 0.0;
@@ -63,6 +62,10 @@ RaySplat load_hit(uint hit) {
     s.z = bound.z;
     s.plane = splat_plane[splat];
     return s;
+}
+
+RaySplat load_hit(uint hit) {
+    return load_ray_splat(hit_splat[hits_base() + hit], hit_index[hits_base() + hit]);
 }
 
 RaySplat broadcast_hit(RaySplat s, uint lane) {
@@ -95,4 +98,16 @@ Slice slice_of(RaySplat s, vec2 centre) {
     slice.alpha = raw >= ALPHA_CUTOFF ? raw : 0.0;
     slice.mean = s.z - s.plane.x * x - s.plane.y * y;
     return slice;
+}
+
+// What a slice (mean, 1 / deviation, strength, alpha) leaves of the light up to depth z. strength: alpha / w(q).
+float left_by(vec4 slice, float q, float exponent, float z) {
+    const float at = (z - slice.x) * slice.y;
+    if (READING == DEPTH_READING_PLANE) return at >= 0.0 ? 1.0 - slice.w : 1.0;
+    const float ahead = READING == DEPTH_READING_FRONT ? min(at, 0.0) : at;
+    const float a = min(slice.z * kernel_value(q + ahead * ahead, exponent), slice.w);
+    const float taken = a >= ALPHA_CUTOFF ? a : 0.0;
+    if (READING == DEPTH_READING_FRONT) return 1.0 - (at >= 0.0 ? slice.w : taken);
+    const float root = sqrt(1.0 - taken);
+    return at >= 0.0 ? (1.0 - slice.w) / root : root;
 }

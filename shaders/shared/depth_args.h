@@ -32,7 +32,6 @@ struct MedianDepthArgs {
     float near_plane;  // world units along z: no surface is before it
     uint segment;      // which MEDIAN_SEGMENT of every list this dispatch takes
     uint segments;     // in all
-    uint walk;         // from 0
 };
 
 struct PointLightArgs {
@@ -42,7 +41,7 @@ struct PointLightArgs {
 
 #ifdef __cplusplus
 static_assert(sizeof(DepthPlaneArgs) == 12);
-static_assert(sizeof(MedianDepthArgs) == 32);
+static_assert(sizeof(MedianDepthArgs) == 28);
 static_assert(sizeof(PointLightArgs) == 8);
 }  // namespace darb::gpu
 #endif
