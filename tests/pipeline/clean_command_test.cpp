@@ -27,14 +27,15 @@ void put_clutter(const glm::dvec3& at, double size, float opacity_logit, SplatMo
     m.opacity_logit.push_back(opacity_logit);
 }
 
-/// A ball of radius 1 at the origin, a small cluster at y = -1.7, and haze over the ball.
+/// A ball of radius 1 at the origin, a small cluster at x = 1.6, and haze over the ball.
 std::string cluttered_scene() {
     SplatModel m;
     Pcg32 rng(4);
     for (std::size_t i = 0; i < kBallSplats; ++i)
         put_clutter(glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal())), 0.08, 3,
                     m);
-    for (std::size_t i = 0; i < kFarSplats; ++i) put_clutter({0.01 * double(i), -1.7, 0}, 0.03, 3, m);
+    for (std::size_t i = 0; i < kFarSplats; ++i)
+        put_clutter({1.6 + 0.01 * double(i), 0, 0}, 0.03, 3, m);
     for (std::size_t i = 0; i < kHazeSplats; ++i)
         put_clutter({0.3 * double(i) - 0.6, 0, -1}, 0.7, -3.5, m);
     const fs::path path = scratch() / "cluttered.ply";

@@ -114,7 +114,8 @@ TEST(PointLight, is_that_of_the_reference) {
                     if (slices.empty()) continue;
                     const auto& slice = slices[points.size() % slices.size()];
                     const double z = slice.mean + slice.deviation * (0.4 - double(x % 3));
-                    points.push_back({x + 0.5f, y + 0.5f, static_cast<float>(z)});
+                    points.push_back({static_cast<float>(x + 0.5), static_cast<float>(y + 0.5),
+                                      static_cast<float>(z)});
                     expected.push_back(light_left(slices, points.back().depth,
                                                   static_cast<Reading>(reading), table, {}));
                 }
