@@ -11,7 +11,7 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kPiece = 4096;        // splats of a thread at a time
+constexpr std::size_t kSplatsAtATime = 4096;  // splats of a thread at a time
 constexpr double kEnds = 2;                 // standard deviations from a splat's centre to its end
 constexpr std::uint32_t kTimesAsOften = 4;  // floating, for each view that sees it at a surface
 
@@ -34,7 +34,7 @@ void FreeSpace::ask(Renderer& renderer, const Camera& camera) {
 }
 
 void FreeSpace::vote(const Camera& c, const ImageF& depth) {
-    in_pieces(model_->size(), kPiece, [&](std::size_t first, std::size_t count) {
+    in_pieces(model_->size(), kSplatsAtATime, [&](std::size_t first, std::size_t count) {
         for (std::size_t i = first; i < first + count; ++i) {
             const glm::dvec3 q = c.rotation * position_of(*model_, i) + c.translation;
             if (!(q.z > 0)) continue;

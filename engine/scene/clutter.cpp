@@ -18,10 +18,10 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kNearest = 12;     // neighbours that are asked first
-constexpr std::size_t kPiece = 1024;     // splats of a thread at a time
-constexpr double kTouch2 = 9;            // squared Mahalanobis distance
-constexpr double kMostTimesLarger = 10;  // of two splats that touch
+constexpr std::size_t kAskedNeighbours = 12;  // neighbours that are asked first
+constexpr std::size_t kSplatsAtATime = 1024;  // splats of a thread at a time
+constexpr double kTouch2 = 9;                 // squared Mahalanobis distance
+constexpr double kMostTimesLarger = 10;       // of two splats that touch
 
 struct Extent {
     glm::dvec3 mean;
@@ -71,12 +71,13 @@ class Extents {
     /// Joins each splat with those of its nearest neighbours that it touches. A chain of these
     /// holds most of a scene together.
     void join_nearest(UnionFind& sets) const {
-        std::vector<std::array<std::uint32_t, kNearest + 1>> nearest(size());
-        in_pieces(size(), kPiece, [&](std::size_t first, std::size_t count) {
+        std::vector<std::array<std::uint32_t, kAskedNeighbours + 1>> nearest(size());
+        in_pieces(size(), kSplatsAtATime, [&](std::size_t first, std::size_t count) {
             for (std::size_t i = first; i < first + count; ++i) {
-                std::array<double, kNearest + 1> distance2;
+                std::array<double, kAskedNeighbours + 1> distance2;
                 nearest[i].fill(static_cast<std::uint32_t>(i));
-                tree_.knnSearch(&means_[i][0], kNearest + 1, nearest[i].data(), distance2.data());
+                tree_.knnSearch(&means_[i][0], kAskedNeighbours + 1, nearest[i].data(),
+                                distance2.data());
                 for (std::uint32_t& j : nearest[i])
                     if (!touch(extents_[i], extents_[j])) j = static_cast<std::uint32_t>(i);
             }
