@@ -27,7 +27,7 @@ constexpr double kFarthest = 4;    // such means: samples beyond it are left out
 constexpr double kDamping = 1e-7;  // of the mean of the diagonal
 constexpr std::size_t kUnknowns = 7;  // turn, shift, logarithm of the scale
 
-struct Frame {
+struct Placement {
     double scale = 1;
     dmat3 rotation{1.0};
     dvec3 shift{0.0};
@@ -50,7 +50,7 @@ std::vector<dvec3> sampled(const TriangleMesh& reference, const dvec3& shift, do
 }
 
 std::vector<NearestPoint> nearest_all(const SurfaceSearch& search, const std::vector<dvec3>& points,
-                                      const Frame& frame) {
+                                      const Placement& frame) {
     std::vector<NearestPoint> found(points.size());
     in_pieces(points.size(), 256, [&](std::size_t first, std::size_t count) {
         for (std::size_t i = first; i < first + count; ++i)
@@ -122,7 +122,7 @@ dmat3 turned_by(const dvec3& w) {
 /// One step of Gauss and Newton; returns how large it was, in extents and radians.
 double step_nearer(const TriangleMesh& mesh, const std::vector<dvec3>& points,
                    const std::vector<NearestPoint>& found, double most, AlignKind kind,
-                   Frame& frame) {
+                   Placement& frame) {
     std::vector<std::size_t> near;
     std::vector<dvec3> placed;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -165,11 +165,11 @@ double step_nearer(const TriangleMesh& mesh, const std::vector<dvec3>& points,
 
 /// Where to begin: as the reference is, or with the middles, and for a similarity the radii, of
 /// both together, whichever is nearer.
-Frame first_frame(const TriangleMesh& mesh, const SurfaceSearch& search,
-                  const std::vector<dvec3>& points, AlignKind kind, double spacing) {
-    const Frame as_it_is;
+Placement first_frame(const TriangleMesh& mesh, const SurfaceSearch& search,
+                      const std::vector<dvec3>& points, AlignKind kind, double spacing) {
+    const Placement as_it_is;
     const Spread ours = spread_of(sampled(mesh, dvec3(0.0), spacing)), theirs = spread_of(points);
-    Frame together;
+    Placement together;
     if (kind == AlignKind::similarity && theirs.radius > 0)
         together.scale = ours.radius / theirs.radius;
     together.shift = ours.middle - together.scale * theirs.middle;
@@ -196,8 +196,8 @@ Alignment align_to_mesh(const TriangleMesh& mesh, const TriangleMesh& reference,
     const std::vector<dvec3> points = sampled(reference, theirs - origin, spacing);
     const SurfaceSearch search(mesh);
     Alignment alignment;
-    alignment.before = trimmed_distance(nearest_all(search, points, Frame{}));
-    Frame frame = first_frame(mesh, search, points, kind, spacing), best = frame;
+    alignment.before = trimmed_distance(nearest_all(search, points, Placement{}));
+    Placement frame = first_frame(mesh, search, points, kind, spacing), best = frame;
     double least = std::numeric_limits<double>::infinity();
     for (int step = 0; step < kMostSteps; ++step) {
         const std::vector<NearestPoint> found = nearest_all(search, points, frame);

@@ -17,7 +17,7 @@ constexpr float kUnseen = -1;
 constexpr int kParts = 4, kRounds = 3;
 // Device memory of a point: its place, its light, and at most an item of its own.
 constexpr std::uint64_t kBytesOfPoint = 12 + 4 + 16;
-constexpr std::size_t kMostPoints = 4'000'000;  // a binding of 128 MiB holds as many
+constexpr std::size_t kMostAtATime = 4'000'000;  // a binding of 128 MiB holds as many
 
 /// What is left of an edge that the surface cuts: shares of it, the free end first, and the light
 /// there.
@@ -87,7 +87,8 @@ OpacityField::OpacityField(Renderer& renderer, const std::vector<DepthView>& vie
     : renderer_(&renderer),
       origin_(origin),
       options_(options),
-      points_at_a_time_(std::clamp<std::size_t>(working_bytes / kBytesOfPoint, 4096, kMostPoints)) {
+      points_at_a_time_(
+          std::clamp<std::size_t>(working_bytes / kBytesOfPoint, 4096, kMostAtATime)) {
     DARB_CHECK(options.reading != DepthReading::expected);
     for (const DepthView& view : views) cameras_.push_back(view.camera);
 }

@@ -21,7 +21,7 @@ namespace darb::python {
 
 namespace {
 
-constexpr double kMost = std::numeric_limits<double>::max(), kLeast = 1e-12;
+constexpr double kLargestNumber = std::numeric_limits<double>::max(), kLeastLength = 1e-12;
 constexpr long long kMostFaces = 2'000'000'000;
 
 /// The option's value, or nothing for None.
@@ -33,7 +33,7 @@ std::optional<py::object> given(const py::dict& options, const char* name) {
 
 double length_or_0(const py::dict& options, const char* name) {
     const auto value = given(options, name);
-    return value ? take_number(*value, name, kLeast, kMost) : 0;
+    return value ? take_number(*value, name, kLeastLength, kLargestNumber) : 0;
 }
 
 std::size_t count_or_0(const py::dict& options, const char* name) {
@@ -47,8 +47,8 @@ std::vector<double> take_numbers(const py::object& value, const char* name, py::
         return take_doubles(value, name, {count});
     std::vector<double> numbers;
     for (const py::handle one : value)
-        numbers.push_back(
-            take_number(py::reinterpret_borrow<py::object>(one), name, -kMost, kMost));
+        numbers.push_back(take_number(py::reinterpret_borrow<py::object>(one), name,
+                                      -kLargestNumber, kLargestNumber));
     if (count != kAny && static_cast<py::ssize_t>(numbers.size()) != count)
         throw Error(name, fmt::format("has {} numbers", numbers.size()),
                     fmt::format("Give {}.", count));
