@@ -34,7 +34,8 @@ std::string cluttered_scene() {
     for (std::size_t i = 0; i < kBallSplats; ++i)
         put_clutter(glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal())), 0.08, 3,
                     m);
-    for (std::size_t i = 0; i < kFarSplats; ++i) put_clutter({0.01 * double(i), -1.7, 0}, 0.03, 3, m);
+    for (std::size_t i = 0; i < kFarSplats; ++i)
+        put_clutter({0.01 * double(i), -1.7, 0}, 0.03, 3, m);
     for (std::size_t i = 0; i < kHazeSplats; ++i)
         put_clutter({0.3 * double(i) - 0.6, 0, -1}, 0.7, -3.5, m);
     const fs::path path = scratch() / "cluttered.ply";
