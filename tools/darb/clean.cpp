@@ -341,48 +341,50 @@ int clean(CleanFlags flags) {
 void add_clean(CLI::App& app, Action& action) {
     auto flags = std::make_shared<CleanFlags>();
     CLI::App* command =
-        app.add_subcommand("clean", "Leave out isolated parts, haze and what floats in free space");
+        app.add_subcommand("clean", "Remove isolated parts, haze and what floats in free space");
     command->add_option("scene", flags->scene, "splat file, or the output folder of darb train")
         ->required();
     command->add_option("-o,--output", flags->output, "the cleaned scene: " + endings_to_write());
-    command->add_flag("--dry-run", flags->dry_run, "say what would go, and write nothing");
+    command->add_flag("--dry-run", flags->dry_run,
+                      "print what would be removed, and write nothing");
     command->add_flag("--force", flags->force, "replace a file that darb did not write");
     command
         ->add_option("--isolated", flags->isolated,
-                     "leave out parts that touch nothing else and have less than this share of the "
-                     "heaviest part's opacity times area")
+                     "remove parts that touch nothing else and whose opacity times area is less "
+                     "than this share of the heaviest part's")
         ->default_str("0.01 if no rule is named, else off")
         ->check(CLI::Range(0.0, 1.0));
     command
         ->add_option("--haze", flags->haze,
-                     "OPACITY,SIZE: leave out splats of at most this opacity whose largest "
-                     "deviation is at least so many times the median, as 0.1,5")
+                     "OPACITY,SIZE, such as 0.1,5: remove splats whose opacity is at most OPACITY "
+                     "and whose largest standard deviation is at least SIZE times the median")
         ->default_str("off");
     command
         ->add_option("--free-space", flags->free_space,
-                     "leave out splats that so many photos look through to a surface behind, and "
-                     "hardly any sees at a surface, as 3")
+                     "remove splats that float before a surface in at least this many views, such "
+                     "as 3, and lie at a surface in at most a quarter as many")
         ->default_str("off")
         ->check(CLI::Range(1, 1000));
     command
         ->add_option("--few-views", flags->few_views,
-                     "leave out splats that are seen, but by fewer photos than this")
+                     "remove splats that are seen, but in fewer views than this")
         ->default_str("off")
         ->check(CLI::Range(1, 1000));
     command
         ->add_option("--region", flags->region,
-                     "leave out what is outside: subject, which is what the cameras look at, "
-                     "subject:1.5 (times its radius), sphere:X,Y,Z,RADIUS, or "
-                     "box:MINX,MINY,MINZ,MAXX,MAXY,MAXZ")
+                     "remove everything outside this region: subject, which is what the cameras "
+                     "look at, with 1.25 times its radius; subject:F, with F times its radius; "
+                     "sphere:X,Y,Z,RADIUS; or box:MINX,MINY,MINZ,MAXX,MAXY,MAXZ")
         ->default_str("off");
     command->add_option("--photos", flags->photos,
-                        "the scene's photos, as darb train takes them: PSNR of those held out is "
-                        "measured before and after");
+                        "the scene's photos, given as to darb train; measures the PSNR of the "
+                        "held-out ones before and after");
     command->add_option("--cameras", flags->cameras,
-                        "a cameras.json, a transforms.json or a data set [those of --photos, else "
-                        "of the scene's run, else 24 around it]");
+                        "a cameras.json, a transforms.json or a data set; --photos brings its own "
+                        "(default: those of the scene's run, else 24 around the scene, which "
+                        "--free-space and --few-views do not take)");
     command->add_option("-r,--resolution", flags->data.resolution,
-                        "of the photos: 1, 2, 4, 8 or a width in px");
+                        "of the photos: 1, 2, 4 or 8 to divide their size, or a width in px");
     add_json_option(*command, flags->json);
     add_effects_flag(*command, flags->effects);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");

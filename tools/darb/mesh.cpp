@@ -470,16 +470,16 @@ struct OptionGroups {
 void add_surface_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
     groups.surface.push_back(
         c.add_option("--method", flags.method,
-                     "tsdf: the mean of the views' distances; opacity: where the opacity of the "
-                     "space passes 1 - level, which keeps thin things and takes longer")
+                     "tsdf: the mean of the distances that the views measure; opacity: where the "
+                     "opacity field passes 1 - level, which keeps thin things and takes longer")
             ->capture_default_str()
             ->check(CLI::IsMember(
                 std::vector<std::string>(std::begin(kMeshMethods), std::end(kMeshMethods)))));
     groups.surface.push_back(
         c.add_option(
              "--depth", flags.reading,
-             "how a splat takes light along a ray: front, solid, plane, or expected, the mean "
-             "of the centres")
+             "how a splat absorbs light along a ray: front, solid, plane, or expected, which is "
+             "the mean of the centres")
             ->capture_default_str()
             ->check(CLI::IsMember(
                 std::vector<std::string>(std::begin(kDepthReadings), std::end(kDepthReadings)))));
@@ -488,10 +488,10 @@ void add_surface_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
             ->capture_default_str()
             ->check(CLI::Range(0.01, 0.99)));
     c.add_option("--voxel", flags.mesh.tsdf.voxel, "side of a voxel, world units")
-        ->default_str("a pixel on the surface, in the median; of a collider 1/256 of its box")
+        ->default_str("the median size of a pixel on the surface; for a collider 1/256 of its box")
         ->check(above_zero());
     groups.surface.push_back(c.add_option("--truncation", flags.mesh.tsdf.truncation,
-                                          "half width of the band around a depth, voxels")
+                                          "half the width of the band around a depth, voxels")
                                  ->capture_default_str()
                                  ->check(CLI::Range(2, 16)));
     groups.surface.push_back(
@@ -499,38 +499,41 @@ void add_surface_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
             ->default_str("4 times the median depth")
             ->check(above_zero()));
     groups.surface.push_back(
-        c.add_option("--near", flags.mesh.near_plane, "nearest distance drawn, world units")
+        c.add_option("--near", flags.mesh.near_plane, "smallest depth that counts, world units")
             ->capture_default_str()
             ->check(above_zero()));
     c.add_option("--bounds", flags.bounds, "X0,Y0,Z0,X1,Y1,Z1: a box that the mesh stays in")
         ->default_str("what two views see");
     c.add_option("--max-memory", flags.max_memory,
-                 "budget of device memory, as 800MB or 1.5GB; the mesh has the same bits")
+                 "limit for device memory, such as 800MB or 1.5GB; the mesh has the same bits with "
+                 "any limit")
         ->default_str("none");
 }
 
 void add_cleaning_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
-    c.add_option("--faces", flags.mesh.faces, "simplify to so many faces")
-        ->default_str("off; of a collider 5000")
+    c.add_option("--faces", flags.mesh.faces, "simplify the mesh to this many faces")
+        ->default_str("off; for a collider 5000")
         ->check(CLI::Range(4, 2'000'000'000));
     groups.surface.push_back(
-        c.add_option("--keep", flags.mesh.keep, "so many parts, the largest")->default_str("all"));
+        c.add_option("--keep", flags.mesh.keep, "keep only this many parts, the largest ones")
+            ->default_str("all"));
     groups.surface.push_back(
         c.add_option(
              "--min-island", flags.mesh.min_island,
-             "smallest part, faces; one of fewer, or of less than 10 voxels across, goes; 0: "
-             "all stay")
+             "drop parts with fewer faces than this, or less than 10 voxels across; 0 keeps "
+             "all parts")
             ->capture_default_str());
     groups.surface.push_back(
         c.add_option("--fill-holes", flags.mesh.fill_holes,
-                     "close holes with a shorter rim, world units, that no camera looks through")
+                     "close holes whose rim is shorter than this, in world units, and through "
+                     "which no camera looks")
             ->default_str("off")
             ->check(above_zero()));
     CLI::Option* const texture =
         c.add_option(
              "--texture", flags.texture,
-             "vertex: a colour at each vertex; splats, photos: pages beside or within the file, "
-             "painted with the scene's own pictures or with its photos; none")
+             "vertex: a colour at each vertex; splats or photos: pictures laid on the faces "
+             "(pages), painted from the scene's own pictures or its photos; none: no colours")
             ->capture_default_str()
             ->check(CLI::IsMember(
                 std::vector<std::string>(std::begin(kMeshTexturings), std::end(kMeshTexturings))));
@@ -543,18 +546,19 @@ void add_cleaning_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
 }
 
 void add_reference_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
-    CLI::Option* const reference = c.add_option(
-        "--reference", flags.reference.path,
-        "compare with this: a mesh or points (" + mesh_endings() + "), or a .json of exact shapes");
+    CLI::Option* const reference =
+        c.add_option("--reference", flags.reference.path,
+                     "compare the mesh with this: a mesh or points (" + mesh_endings() +
+                         "), or a .json of exact shapes");
     c.add_option("--thresholds", flags.reference.thresholds,
-                 "distances of the F-score, world units, with commas")
+                 "distances of the F-score, world units, separated by commas")
         ->delimiter(',')
         ->check(above_zero())
         ->default_str("1, 2 and 4 voxels")
         ->needs(reference);
     c.add_option("--align", flags.align,
-                 "first bring the reference to the mesh: rigid, turned and moved; similarity, "
-                 "scaled as well")
+                 "first bring the reference to the mesh: rigid turns and moves it, similarity "
+                 "scales it as well")
         ->default_str("off")
         ->check(CLI::IsMember({"rigid", "similarity"}))
         ->needs(reference);
@@ -564,11 +568,11 @@ void add_reference_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) 
 void add_collider_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
     CLI::Option* const collider = c.add_option(
         "--collider", flags.collider,
-        "instead make a closed mesh for programs that move bodies, of a room, a ground or an "
-        "object: cameras stand in what is free");
+        "instead of the surface, make a closed mesh for a physics engine, of a room, a ground or "
+        "an object; no camera ends up inside what is solid");
     collider->check(CLI::IsMember({"room", "ground", "object"}))->default_str("off");
     groups.collider.push_back(c.add_option("--capsule", flags.capsule,
-                                           "radius and height of who walks there, world units")
+                                           "radius and height of whoever walks there, world units")
                                   ->default_str("0.2,1.6"));
     groups.collider.push_back(
         c.add_option("--up", flags.up,
@@ -591,10 +595,11 @@ void add_mesh(CLI::App& app, Action& action) {
                      "the mesh; the ending says the format: " + mesh_endings())
         ->required();
     command->add_option("--cameras", flags->cameras,
-                        "from where to look: a cameras.json, a transforms.json or a data set "
-                        "[those of the scene's run; else 32 around it]");
-    command->add_option("-r,--resolution", flags->data.resolution,
-                        "of a data set's cameras: 1, 2, 4, 8 or a width in px");
+                        "the cameras that look at the surface: a cameras.json, a transforms.json "
+                        "or a data set (default: those of the scene's run, else 32 around it)");
+    command->add_option(
+        "-r,--resolution", flags->data.resolution,
+        "of a data set's cameras: 1, 2, 4 or 8 to divide their size, or a width in px");
     OptionGroups groups;
     add_surface_options(*command, *flags, groups);
     add_cleaning_options(*command, *flags, groups);
@@ -602,7 +607,7 @@ void add_mesh(CLI::App& app, Action& action) {
     add_collider_options(*command, *flags, groups);
     command->add_flag("--force", flags->force, "replace a file that darb did not write");
     add_json_option(*command, flags->json);
-    add_kernel_flags(*command, flags->kernel, "draw with it in the place of the scene's own");
+    add_kernel_flags(*command, flags->kernel, "draw with it in place of the scene's own");
     add_effects_flag(*command, flags->effects);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
