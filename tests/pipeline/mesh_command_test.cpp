@@ -17,6 +17,7 @@
 #include "engine/mesh/surface_search.h"
 #include "engine/mesh/topology.h"
 #include "engine/scene/ply.h"
+#include "engine/scene/splat_file.h"
 #include "tests/support/run_command.h"
 
 namespace darb::test {
@@ -120,6 +121,21 @@ TEST(MeshCommand, Has_the_same_bits_again_and_within_less_memory) {
     const auto bytes = read_file(scratch_file("first.ply"));
     EXPECT_EQ(bytes, read_file(scratch_file("again.ply")));
     EXPECT_EQ(bytes, read_file(scratch_file("ranges.ply")));
+}
+
+// Rings rise again along a ray, so the default is another reading there.
+TEST(MeshCommand, Reads_kernels_with_rings_by_their_planes) {
+    SplatModel ball = load_splats(ball_file());
+    ball.kernel = KERNEL_SINC_2_PULSES;
+    const fs::path ringed = scratch() / "ringed.ply";
+    write_ply(ringed, ball);
+    const std::string report = scratch_file("rings.json");
+    const std::string mesh = fmt::format("mesh '{}' --cameras '{}' --voxel 0.1 -o '{}' ",
+                                         ringed.string(), cameras_file(), scratch_file("r.obj"));
+    const Outcome o = darb(mesh + "--json " + report);
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(read_json(report)["depth"], "plane");
+    EXPECT_EQ(darb(mesh + "--depth front").code, 2);
 }
 
 TEST(MeshCommand, Takes_the_opacity_of_the_space) {

@@ -46,7 +46,7 @@ constexpr double kManyThin = 0.01;      // of the blocks with a surface: worth a
 
 struct MeshFlags {
     std::filesystem::path scene, cameras, output, json;
-    std::string method = "tsdf", reading = "front", bounds, max_memory, texture = "vertex", device;
+    std::string method = "tsdf", reading, bounds, max_memory, texture = "vertex", device;
     std::string effects = "auto", collider, capsule, up, align;
     bool force = false, quiet = false;
     SceneMeshOptions mesh;
@@ -239,7 +239,7 @@ nlohmann::json report_json(const MeshFlags& flags, const SceneMesh& result) {
                         {"voxel", r.tsdf.voxel},
                         {"farthest", r.tsdf.farthest},
                         {"method", flags.method},
-                        {"depth", flags.reading},
+                        {"depth", kDepthReadings[static_cast<std::size_t>(flags.mesh.reading)]},
                         {"level", flags.mesh.level},
                         {"views", r.views},
                         {"surface_share", share(r.depths.surfaces, r.depths.pixels)},
@@ -329,7 +329,7 @@ MeshResult make_surface(const MeshFlags& flags, const MeshProgress& progress) {
     MeshFlags f = flags;
     f.mesh.effects = choose_effects(f.effects, EffectUse::pictures, f.data);
     const SplatModel model = opened_scene(f);
-    f.mesh.reading = *depth_reading_from_name(f.reading);
+    f.mesh.reading = depth_reading_from_name(f.reading).value_or(usual_reading(model.kernel));
     f.mesh.method = *mesh_method_from_name(f.method);
     if (!f.bounds.empty()) f.mesh.tsdf.bounds = box_from(f.bounds, model.origin);
     std::optional<MeshPhotos> photos;
@@ -480,7 +480,7 @@ void add_surface_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
              "--depth", flags.reading,
              "how a splat absorbs light along a ray: front, solid, plane, or expected, which is "
              "the mean of the centres")
-            ->capture_default_str()
+            ->default_str("front; of kernels with several pulses plane")
             ->check(CLI::IsMember(
                 std::vector<std::string>(std::begin(kDepthReadings), std::end(kDepthReadings)))));
     groups.surface.push_back(

@@ -66,13 +66,17 @@ std::optional<WorldBox> take_bounds(const py::dict& options, const glm::dvec3& o
     return WorldBox{low - origin, high - origin};
 }
 
-SceneMeshOptions take_options(const py::dict& options, const glm::dvec3& origin) {
+SceneMeshOptions take_options(const py::dict& options, const glm::dvec3& origin, int kernel) {
     SceneMeshOptions o;
-    const std::string depth = take_text(options["depth"], "depth");
-    const auto reading = depth_reading_from_name(depth);
-    if (!reading)
-        throw Error("depth " + depth, "no such reading", "Use front, solid, plane or expected.");
-    o.reading = *reading;
+    o.reading = usual_reading(kernel);
+    if (given(options, "depth")) {
+        const std::string depth = take_text(options["depth"], "depth");
+        const auto reading = depth_reading_from_name(depth);
+        if (!reading)
+            throw Error("depth " + depth, "no such reading",
+                        "Use front, solid, plane or expected.");
+        o.reading = *reading;
+    }
     const std::string named = take_text(options["method"], "method");
     const auto method = mesh_method_from_name(named);
     if (!method) throw Error("method " + named, "no such method", "Use tsdf or opacity.");
@@ -262,7 +266,7 @@ void write_output(const py::dict& options, const TriangleMesh& mesh,
 }
 
 py::tuple surface(PyDevice& device, const PyScene& scene, const py::dict& options) {
-    const SceneMeshOptions o = take_options(options, scene.model().origin);
+    const SceneMeshOptions o = take_options(options, scene.model().origin, scene.model().kernel);
     const auto reference = take_reference(options);
     std::vector<View> views = take_views(options);
     std::optional<MeshPhotos> photos;

@@ -202,7 +202,7 @@ def _scene_render(self, viewmats, Ks, width, height, **options):
 
 
 def _scene_mesh(self, viewmats=None, Ks=None, width=None, height=None, *, cameras=None,
-                resolution=-1, method="tsdf", depth="front", level=0.5, voxel=None,
+                resolution=-1, method="tsdf", depth=None, level=0.5, voxel=None,
                 truncation=4, far=None, near=0.2, bounds=None, faces=None, keep=None,
                 min_island=50, fill_holes=None, texture="vertex", texel=None, collider=None,
                 capsule=(0.2, 1.6), up=None, reference=None, thresholds=None, align=None,

@@ -90,7 +90,7 @@ class Scene:
     def mesh(self, viewmats: Optional[ArrayLike] = None, Ks: Optional[ArrayLike] = None,
              width: Optional[int] = None, height: Optional[int] = None, *,
              cameras: Optional[Path] = None, resolution: int = -1, method: str = "tsdf",
-             depth: str = "front", level: float = 0.5, voxel: Optional[float] = None,
+             depth: Optional[str] = None, level: float = 0.5, voxel: Optional[float] = None,
              truncation: int = 4,
              far: Optional[float] = None, near: float = 0.2, bounds: Optional[ArrayLike] = None,
              faces: Optional[int] = None, keep: Optional[int] = None, min_island: int = 50,
