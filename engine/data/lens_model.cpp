@@ -105,7 +105,7 @@ bool LensModel::panorama() const {
 }
 
 bool LensModel::distorted() const {
-    if (parameters.empty()) return false;
+    if (model == LensModel().model && parameters.empty()) return false;
     const ModelRow& row = model_of(*this);
     if (panorama()) return true;
     if (model.ends_with("FISHEYE")) return true;
