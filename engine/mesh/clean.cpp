@@ -513,10 +513,10 @@ Simplified simplify_mesh(const TriangleMesh& mesh, std::size_t faces) {
     if (mesh.face_count() <= faces || mesh.face_count() == 0) return result;
     std::vector<Corners>& kept = result.mesh.face;
     float error = 0;
-    const std::size_t indices = meshopt_simplify(
-        kept.data()->data(), mesh.face.data()->data(), 3 * mesh.face_count(),
-        &mesh.position.data()->x, mesh.vertex_count(), sizeof(glm::vec3), 3 * faces,
-        std::numeric_limits<float>::max(), meshopt_SimplifyLockBorder, &error);
+    const std::size_t indices =
+        meshopt_simplify(kept.data()->data(), mesh.face.data()->data(), 3 * mesh.face_count(),
+                         &mesh.position.data()->x, mesh.vertex_count(), sizeof(glm::vec3),
+                         3 * faces, std::numeric_limits<float>::max(), 0, &error);
     kept.resize(indices / 3);
     remove_opposite_faces(result.mesh);
     split_into_manifold(result.mesh);

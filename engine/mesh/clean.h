@@ -61,8 +61,8 @@ struct Simplified {
     double largest_distance = 0;  // of a vertex of the full mesh to `mesh`, world units
 };
 /// Collapses edges by the quadric error until at most `faces` are left, or until no edge can go.
-/// Vertices on rims stay; a closed manifold stays one. Throws Error that names the package where
-/// darb was built without meshoptimizer.
+/// Rims keep their lines as surfaces keep their shapes; a closed manifold stays one. Throws Error
+/// that names the package where darb was built without meshoptimizer.
 Simplified simplify_mesh(const TriangleMesh& mesh, std::size_t faces);
 
 }  // namespace darb

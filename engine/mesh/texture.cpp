@@ -359,6 +359,16 @@ bool in_frame(const Camera& camera, const dvec3& pixel) {
            pixel.y <= camera.height - 0.5;
 }
 
+/// The mean of the normals at the face's corners, which noise in the surface turns less than its
+/// own; that where the mesh has none.
+dvec3 smooth_normal(const TriangleMesh& mesh, std::uint32_t face) {
+    if (mesh.normal.empty()) return glm::normalize(face_cross(mesh, face));
+    dvec3 sum(0.0);
+    for (const std::uint32_t v : mesh.face[face]) sum += dvec3(mesh.normal[v]);
+    const double length = glm::length(sum);
+    return length > 0 ? sum / length : glm::normalize(face_cross(mesh, face));
+}
+
 /// cos^2/z^2 of the view for the face; 0 where it does not see it.
 double score_of(const TriangleMesh& mesh, std::uint32_t face, const PhotoViews& views,
                 std::size_t view) {
@@ -370,8 +380,8 @@ double score_of(const TriangleMesh& mesh, std::uint32_t face, const PhotoViews& 
         if (!pixel || !in_frame(camera, *pixel)) return 0;
         middle += world / 3.0;
     }
-    const dvec3 normal = face_cross(mesh, face), to = camera.centre() - middle;
-    const double cosine = glm::dot(normal, to) / (glm::length(normal) * glm::length(to));
+    const dvec3 to = camera.centre() - middle;
+    const double cosine = glm::dot(smooth_normal(mesh, face), to) / glm::length(to);
     constexpr double kGrazing = 0.1;  // 84 degrees
     if (!(cosine > kGrazing) || !views.sees(view, middle)) return 0;
     const double z = projected(camera, middle)->z;
@@ -385,7 +395,7 @@ struct Candidate {
 
 std::vector<Candidate> candidates_of(const TriangleMesh& mesh, std::uint32_t face,
                                      const PhotoViews& views) {
-    constexpr std::size_t kMostCandidates = 8;
+    constexpr std::size_t kMostCandidates = 16;
     std::vector<Candidate> found;
     for (std::uint32_t view = 0; view < views.cameras.size(); ++view)
         if (const double score = score_of(mesh, face, views, view); score > 0)

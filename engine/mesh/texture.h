@@ -66,7 +66,7 @@ struct PhotoChoice {
 /// Faces and then connected patches of one photo move to a cheaper one, in their order, until none
 /// does: no cut of a graph, but the same bits on every machine.
 PhotoChoice choose_photos(const TriangleMesh& mesh, const PhotoViews& views,
-                          double smoothing = 1.0);
+                          double smoothing = 3.0);
 
 /// Paints each face with its photo, one photo after the other. Faces without one get the colours of
 /// their vertices, or grey where the mesh has none.

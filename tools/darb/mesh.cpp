@@ -311,8 +311,8 @@ void note_faces_left(std::size_t faces, std::size_t asked) {
     constexpr double kNear = 1.05;
     if (asked == 0 || double(faces) <= kNear * double(asked)) return;
     say_note(fmt::format(
-        "{} faces are left where {} were asked for, as vertices on rims stay; fewer small parts "
-        "(--min-island, --keep) and closed holes (--fill-holes) have shorter rims",
+        "{} faces are left where {} were asked for: fewer would join parts or holes; leave out "
+        "small parts (--min-island, --keep) or close holes (--fill-holes)",
         faces, asked));
 }
 

@@ -270,9 +270,25 @@ TEST(SimplifyMesh, keeps_shape_topology_and_rims) {
     EXPECT_LT(simple.largest_distance, 0.05);
     const Simplified flat = simplify_mesh(square_mesh(4, 12), 40);
     EXPECT_NEAR(topology_of(flat.mesh).rim_length, 16, 1e-5);
-    EXPECT_EQ(topology_of(flat.mesh).rim_edges, 48u) << "vertices of the rim stay";
+    EXPECT_LT(topology_of(flat.mesh).rim_edges, 40u) << "a straight rim needs few vertices";
     EXPECT_LT(flat.largest_distance, 1e-6);
     EXPECT_EQ(simplify_mesh(torus, 1000000).mesh.face, torus.face);
+}
+
+// Half of the vertices of such a surface lie on rims. If those stayed, the few others would have to
+// carry all that is asked for, as triangles far from the surface.
+TEST(SimplifyMesh, ragged_surfaces_become_as_small_as_asked) {
+    if (!can_simplify()) GTEST_SKIP() << "built without meshoptimizer";
+    TriangleMesh ragged = square_mesh(4, 80);
+    for (glm::vec3& p : ragged.position) p.z = 0.2f * std::sin(2 * p.x) * std::cos(3 * p.y);
+    std::erase_if(ragged.face, [](const auto& face) {
+        return face[0] % 81 % 6 < 3 && face[0] / 81 % 6 < 3 && face[0] % 81 > 2 && face[0] > 162;
+    });
+    const Simplified simple = simplify_mesh(ragged, 3000);
+    EXPECT_LE(simple.mesh.face_count(), 3000u);
+    EXPECT_GE(simple.mesh.face_count(), 2500u);
+    EXPECT_LT(simple.largest_distance, 0.02);
+    EXPECT_EQ(topology_of(simple.mesh).parts, topology_of(ragged).parts);
 }
 
 TEST(SimplifyMesh, without_the_library_names_the_package) {

@@ -11,6 +11,7 @@
 
 #include "engine/core/error.h"
 #include "engine/mesh/topology.h"
+#include "engine/mesh/tsdf.h"
 #include "tests/support/mesh_shapes.h"
 
 namespace darb::test {
@@ -242,6 +243,22 @@ TEST(ChoosePhotos, smoothing_leaves_fewer_seams) {
     EXPECT_GT(rough.seams, 200u);
     EXPECT_LT(double(smooth.seams), 0.4 * double(rough.seams));
     EXPECT_EQ(choose_photos(mesh, views, 1).view, smooth.view);
+}
+
+// Noise turns the normals of single faces, but those of vertices less.
+TEST(ChoosePhotos, noise_in_the_surface_leaves_few_seams) {
+    TriangleMesh mesh = square_around_0(48);
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+        mesh.position[v].z = 0.015f * std::sin(91.7f * static_cast<float>(v));
+    PhotoViews views = views_of_square();
+    for (const double x : {-2.0, -0.7, 0.7, 2.0})
+        views.cameras.push_back(camera_at({x, 0.3, 3}, {0, 0, 0}));
+    views.sees = [](std::size_t, const dvec3&) { return true; };
+    const std::size_t by_faces = choose_photos(mesh, views).seams;
+    set_normals(mesh);
+    const std::size_t by_vertices = choose_photos(mesh, views).seams;
+    EXPECT_GT(by_faces, 0u);
+    EXPECT_LT(double(by_vertices), 0.8 * double(by_faces));
 }
 
 TEST(PaintWithPhotos, texels_are_what_the_photo_shows_there) {
