@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::size_t kAskedNeighbours = 12;  // neighbours that are asked first
 constexpr std::size_t kSplatsAtATime = 1024;  // splats of a thread at a time
+constexpr std::size_t kFewSplats = 5000;      // of a set whose every neighbour is looked for
 constexpr double kTouch2 = 9;                 // squared Mahalanobis distance
 constexpr double kMostTimesLarger = 10;       // of two splats that touch
 
@@ -118,14 +119,14 @@ SplatParts parts_of_splats(const SplatModel& model) {
     const Extents extents(model, mass);
     UnionFind sets(extents.size());
     extents.join_nearest(sets);
-    // The splats outside the largest set are few, so all that they touch is looked for. That joins
-    // what the nearest neighbours alone left apart.
+    // Of small sets all that they touch is looked for, which joins what the nearest neighbours
+    // alone left apart. For large ones that would take very long.
     std::vector<std::size_t> members(extents.size(), 0);
     for (std::size_t i = 0; i < extents.size(); ++i) ++members[sets.find(std::uint32_t(i))];
-    const auto largest = static_cast<std::uint32_t>(
-        std::max_element(members.begin(), members.end()) - members.begin());
+    std::vector<std::size_t> few;
     for (std::size_t i = 0; i < extents.size(); ++i)
-        if (sets.find(std::uint32_t(i)) != sets.find(largest)) extents.join_all(i, sets);
+        if (members[sets.find(std::uint32_t(i))] < kFewSplats) few.push_back(i);
+    for (const std::size_t i : few) extents.join_all(i, sets);
     SplatParts parts;
     constexpr std::uint32_t kNone = ~0u;
     std::vector<std::uint32_t> number(extents.size(), kNone);

@@ -25,7 +25,8 @@ struct SplatParts {
 
 /// Two splats touch where the squared Mahalanobis distance of their means, under the sum of both
 /// covariances, is at most 9, unless one is more than ten times as large as the other: a sky behind
-/// a bird does not hold it. Splats that are never drawn are parts of their own without mass.
+/// a bird does not hold it. Splats that are never drawn are parts of their own without mass. Chains
+/// of 5,000 splats or more are joined only through the nearest neighbours of their splats.
 SplatParts parts_of_splats(const SplatModel& model);
 
 /// The splats of parts with less than `least_share` of the mass of the heaviest part.
