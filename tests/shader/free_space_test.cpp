@@ -8,19 +8,10 @@
 
 #include "engine/core/rng.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/splat_files.h"
 
 namespace darb::test {
 namespace {
-
-void put_splat_in_room(const glm::dvec3& at, double size, float opacity_logit, SplatModel& m) {
-    for (int c = 0; c < 3; ++c) {
-        m.position.push_back(static_cast<float>(at[c]));
-        m.log_scale.push_back(static_cast<float>(std::log(size)));
-        m.sh_dc.push_back(0.5f);
-    }
-    for (const float w : {1.0f, 0.0f, 0.0f, 0.0f}) m.rotation.push_back(w);
-    m.opacity_logit.push_back(opacity_logit);
-}
 
 /// At x, 0, 0, looking along z.
 Camera camera_in_room(double x) {
@@ -46,16 +37,20 @@ RoomWithFloaters room_with_floaters() {
     RoomWithFloaters r;
     Pcg32 rng(3);
     for (int i = 0; i < 3000; ++i)
-        put_splat_in_room({8 * rng.uniform() - 4, 6 * rng.uniform() - 3, 5}, 0.12, 4, r.model);
+        append_splat({8 * rng.uniform() - 4, 6 * rng.uniform() - 3, 5}, glm::dvec3(0.12), 4,
+                     r.model);
     r.faint = r.model.size();
-    for (int i = 0; i < 6; ++i) put_splat_in_room({0.3 * i - 0.75, 0.4, 2.5}, 0.05, -2.5, r.model);
+    for (int i = 0; i < 6; ++i)
+        append_splat({0.3 * i - 0.75, 0.4, 2.5}, glm::dvec3(0.05), -2.5, r.model);
     r.dense = r.model.size();
     for (int i = 0; i < 300; ++i) {
         const glm::dvec3 way(rng.normal(), rng.normal(), rng.normal());
-        put_splat_in_room(glm::dvec3(0, -0.4, 2.5) + 0.15 * glm::normalize(way), 0.03, 4, r.model);
+        append_splat(glm::dvec3(0, -0.4, 2.5) + 0.15 * glm::normalize(way), glm::dvec3(0.03), 4,
+                     r.model);
     }
     r.behind = r.model.size();
-    for (int i = 0; i < 5; ++i) put_splat_in_room({0.3 * i - 0.6, 0, 8}, 0.05, -2.5, r.model);
+    for (int i = 0; i < 5; ++i)
+        append_splat({0.3 * i - 0.6, 0, 8}, glm::dvec3(0.05), -2.5, r.model);
     for (int v = 0; v < 5; ++v) r.cameras.push_back(camera_in_room(0.2 * v - 0.4));
     return r;
 }
@@ -80,7 +75,8 @@ TEST(FreeSpace, is_before_a_surface_and_faint) {
 // A single camera finds a surface where two faint splats take a quarter of its light together.
 TEST(FreeSpace, ends_where_enough_light_is_taken) {
     RoomWithFloaters r = room_with_floaters();
-    for (int i = 0; i < 6; ++i) put_splat_in_room({0.3 * i - 0.75, 0.4, 2.5}, 0.05, -1, r.model);
+    for (int i = 0; i < 6; ++i)
+        append_splat({0.3 * i - 0.75, 0.4, 2.5}, glm::dvec3(0.05), -1, r.model);
     FreeSpaceOptions sparing;
     sparing.taken = 0.2;
     const SplatSet set = found_in_space(r, sparing);

@@ -22,6 +22,18 @@ namespace darb::test {
 using FileBytes = std::vector<std::byte>;
 using Reader = std::function<SplatModel(std::span<const std::byte>)>;
 
+/// Appends a splat along the axes; sizes are standard deviations.
+inline void append_splat(const glm::dvec3& at, const glm::dvec3& sizes, float opacity_logit,
+                         SplatModel& m) {
+    for (int c = 0; c < 3; ++c) {
+        m.position.push_back(static_cast<float>(at[c]));
+        m.log_scale.push_back(static_cast<float>(std::log(sizes[c])));
+        m.sh_dc.push_back(0.5f);
+    }
+    for (const float w : {1.0f, 0.0f, 0.0f, 0.0f}) m.rotation.push_back(w);
+    m.opacity_logit.push_back(opacity_logit);
+}
+
 inline SplatModel sample_model(int degree, size_t count, std::uint64_t seed = 1) {
     return random_scene({.count = count,
                          .sh_degree = degree,

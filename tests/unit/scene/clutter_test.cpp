@@ -13,22 +13,12 @@
 namespace darb::test {
 namespace {
 
-void put_splat(const glm::dvec3& at, const glm::dvec3& sizes, float opacity_logit, SplatModel& m) {
-    for (int c = 0; c < 3; ++c) {
-        m.position.push_back(static_cast<float>(at[c]));
-        m.log_scale.push_back(static_cast<float>(std::log(sizes[c])));
-        m.sh_dc.push_back(0.5f);
-    }
-    for (const float w : {1.0f, 0.0f, 0.0f, 0.0f}) m.rotation.push_back(w);
-    m.opacity_logit.push_back(opacity_logit);
-}
-
 void put_shell(const glm::dvec3& centre, double radius, int count, SplatModel& m) {
     Pcg32 rng(static_cast<std::uint64_t>(count));
     for (int i = 0; i < count; ++i) {
         const glm::dvec3 way(rng.normal(), rng.normal(), rng.normal());
-        put_splat(centre + radius * glm::normalize(way), glm::dvec3(2 * radius / std::sqrt(count)),
-                  3, m);
+        append_splat(centre + radius * glm::normalize(way),
+                     glm::dvec3(2 * radius / std::sqrt(count)), 3, m);
     }
 }
 
@@ -50,14 +40,14 @@ TEST(Clutter, parts_hold_what_touches) {
     // A chain of thin needles along x joins both; one across it would not.
     SplatModel joined = m, crossed = m;
     for (double x = 1.2; x < 3; x += 0.4) {
-        put_splat({x, 0, 0}, {0.15, 0.02, 0.02}, 3, joined);
-        put_splat({x, 0, 0}, {0.02, 0.15, 0.02}, 3, crossed);
+        append_splat({x, 0, 0}, {0.15, 0.02, 0.02}, 3, joined);
+        append_splat({x, 0, 0}, {0.02, 0.15, 0.02}, 3, crossed);
     }
     EXPECT_EQ(parts_among(parts_of_splats(joined), 0, joined.size()), 1u);
     EXPECT_EQ(parts_among(parts_of_splats(crossed), 0, bridge), 2u);
     // A splat as large as both lies over them, as a sky does, and joins nothing.
     SplatModel sky = m;
-    put_splat({2, 0, 0}, glm::dvec3(6), 3, sky);
+    append_splat({2, 0, 0}, glm::dvec3(6), 3, sky);
     EXPECT_EQ(parts_among(parts_of_splats(sky), 0, bridge), 2u);
 }
 
@@ -67,10 +57,10 @@ TEST(Clutter, parts_are_joined_beyond_the_nearest_neighbours) {
     SplatModel m;
     for (int i = 0; i < 3000; ++i) {
         const double angle = 0.01 * i;
-        put_splat({0.05 * std::cos(angle), 0.05 * std::sin(angle), 0}, glm::dvec3(0.02), 3, m);
+        append_splat({0.05 * std::cos(angle), 0.05 * std::sin(angle), 0}, glm::dvec3(0.02), 3, m);
     }
-    for (int i = 0; i < 40; ++i) put_splat({0.34 + 1e-4 * i, 0, 0}, glm::dvec3(0.01), 3, m);
-    put_splat({0.2, 0, 0}, glm::dvec3(0.075), 3, m);
+    for (int i = 0; i < 40; ++i) append_splat({0.34 + 1e-4 * i, 0, 0}, glm::dvec3(0.01), 3, m);
+    append_splat({0.2, 0, 0}, glm::dvec3(0.075), 3, m);
     EXPECT_EQ(parts_among(parts_of_splats(m), 0, m.size()), 1u);
 }
 
@@ -80,9 +70,9 @@ TEST(Clutter, isolated_parts_are_the_light_ones) {
     const std::size_t thing = m.size();
     put_shell({5, 0, 0}, 0.5, 500, m);  // a quarter of the area
     const std::size_t floaters = m.size();
-    for (int i = 0; i < 20; ++i) put_splat({0, 2 + 0.5 * i, 0}, glm::dvec3(0.03), 3, m);
-    put_splat({0, 0, 1}, glm::dvec3(0.05), -30, m);  // never drawn
-    m.rotation[4 * (m.size() - 2)] = 0;              // nor is this
+    for (int i = 0; i < 20; ++i) append_splat({0, 2 + 0.5 * i, 0}, glm::dvec3(0.03), 3, m);
+    append_splat({0, 0, 1}, glm::dvec3(0.05), -30, m);  // never drawn
+    m.rotation[4 * (m.size() - 2)] = 0;                 // nor is this
     const SplatSet set = isolated_splats(m, 0.01);
     for (std::size_t i = 0; i < m.size(); ++i) EXPECT_EQ(set[i], i >= floaters ? 1 : 0) << i;
     const SplatSet larger = isolated_splats(m, 0.5);
@@ -93,10 +83,10 @@ TEST(Clutter, isolated_parts_are_the_light_ones) {
 
 TEST(Clutter, haze_is_large_and_faint) {
     SplatModel m;
-    for (int i = 0; i < 9; ++i) put_splat({i, 0, 0}, glm::dvec3(0.1), 3, m);
-    put_splat({0, 1, 0}, {0.1, 0.9, 0.1}, -3, m);  // opacity 0.047
-    put_splat({0, 2, 0}, {0.1, 0.9, 0.1}, 0, m);   // opacity 0.5
-    put_splat({0, 3, 0}, glm::dvec3(0.1), -3, m);
+    for (int i = 0; i < 9; ++i) append_splat({i, 0, 0}, glm::dvec3(0.1), 3, m);
+    append_splat({0, 1, 0}, {0.1, 0.9, 0.1}, -3, m);  // opacity 0.047
+    append_splat({0, 2, 0}, {0.1, 0.9, 0.1}, 0, m);   // opacity 0.5
+    append_splat({0, 3, 0}, glm::dvec3(0.1), -3, m);
     const SplatSet set = hazy_splats(m, 0.1, 5);
     for (std::size_t i = 0; i < m.size(); ++i) EXPECT_EQ(set[i], i == 9 ? 1 : 0) << i;
     EXPECT_EQ(count_of(hazy_splats(m, 0.1, 10)), 0u);

@@ -16,22 +16,13 @@ namespace {
 
 constexpr double kWholeTurn = 2 * std::numbers::pi;
 
-void add_splat(const glm::dvec3& at, double size, SplatModel& m) {
-    for (int c = 0; c < 3; ++c) {
-        m.position.push_back(static_cast<float>(at[c]));
-        m.log_scale.push_back(static_cast<float>(std::log(size)));
-        m.sh_dc.push_back(0.5f);
-    }
-    for (const float w : {1.0f, 0.0f, 0.0f, 0.0f}) m.rotation.push_back(w);
-    m.opacity_logit.push_back(3);
-}
-
 /// Splats on a sphere.
 void add_shell(const glm::dvec3& centre, double radius, int count, SplatModel& m) {
     Pcg32 rng(static_cast<std::uint64_t>(count));
     for (int i = 0; i < count; ++i) {
         const glm::dvec3 way(rng.normal(), rng.normal(), rng.normal());
-        add_splat(centre + radius * glm::normalize(way), 2 * radius / std::sqrt(count), m);
+        append_splat(centre + radius * glm::normalize(way),
+                     glm::dvec3(2 * radius / std::sqrt(count)), 3, m);
     }
 }
 
@@ -42,7 +33,7 @@ void add_plane(const glm::dvec3& from, const glm::dvec3& a, const glm::dvec3& b,
     const double size = std::sqrt(glm::length(a) * glm::length(b) / count);
     for (int i = 0; i < count; ++i) {
         const double u = rng.uniform(), v = rng.uniform();
-        add_splat(from + u * a + v * b, size, m);
+        append_splat(from + u * a + v * b, glm::dvec3(size), 3, m);
     }
 }
 
@@ -203,7 +194,8 @@ TEST(Subject, without_cameras_is_what_is_dense) {
     Pcg32 rng(5);
     for (int i = 0; i < 6000; ++i) {  // denser and denser towards the middle
         const glm::dvec3 way(rng.normal(), rng.normal(), rng.normal());
-        add_splat(kMiddle + glm::normalize(way) * std::exp(4.0 * i / 6000 - 2), 0.05, m);
+        append_splat(kMiddle + glm::normalize(way) * std::exp(4.0 * i / 6000 - 2), glm::dvec3(0.05),
+                     3, m);
     }
     add_shell({0, 0, 0}, 200, 3000, m);
     const Bounds dense = dense_bounds(m);

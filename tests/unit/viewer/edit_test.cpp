@@ -115,8 +115,8 @@ TEST(Edit, Sphere_and_origin_are_in_world_coordinates) {
     EXPECT_EQ(edit.remove(m, sphere, true), 0u);  // those are gone
 }
 
-SplatMask only(size_t n, std::initializer_list<size_t> splats) {
-    SplatMask mask(n, 0);
+SplatSet only(size_t n, std::initializer_list<size_t> splats) {
+    SplatSet mask(n, 0);
     for (const size_t i : splats) mask[i] = 1;
     return mask;
 }
@@ -130,13 +130,13 @@ TEST(Edit, Selections_combine_and_leave_what_is_not_seen) {
     EXPECT_EQ(edit.selected(), only(6, {0, 2, 3}));
     EXPECT_EQ(edit.hide_selected(), 3u);
     EXPECT_EQ(edit.selected_count(), 0u);
-    EXPECT_EQ(edit.select(SplatMask(6, 1), Combine::replace), 3u) << "hidden ones are not";
+    EXPECT_EQ(edit.select(SplatSet(6, 1), Combine::replace), 3u) << "hidden ones are not";
     EXPECT_EQ(edit.invert_selection(), 3u);
     EXPECT_EQ(edit.selected_count(), 0u);
     EXPECT_EQ(edit.apply(m).size(), 6u) << "hidden ones are saved";
     EXPECT_FALSE(edit.unsaved()) << "nothing that is saved has changed";
     EXPECT_EQ(edit.show_hidden(), 3u);
-    EXPECT_EQ(edit.unseen(), SplatMask(6, 0));
+    EXPECT_EQ(edit.unseen(), SplatSet(6, 0));
     while (edit.can_undo()) EXPECT_NE(edit.undo(m), "");
     EXPECT_EQ(edit.selected_count() + edit.hidden_count(), 0u);
     EXPECT_EQ(edit.redo(m), "selected 2 splats");

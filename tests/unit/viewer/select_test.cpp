@@ -40,13 +40,13 @@ Camera camera() {
     return c;
 }
 
-int count(const SplatMask& mask) {
+int count(const SplatSet& mask) {
     return std::accumulate(mask.begin(), mask.end(), 0);
 }
 
 TEST(Select, Rectangle_takes_its_corners_in_any_order) {
     const SplatModel m = grid();
-    const SplatMask mask = in_rectangle(m, camera(), {350, 450}, {150, 250});
+    const SplatSet mask = in_rectangle(m, camera(), {350, 450}, {150, 250});
     EXPECT_EQ(count(mask), 4);  // x at 200 and 300, y at 300 and 400
     EXPECT_EQ(mask[11] + mask[12] + mask[16] + mask[17], 4);
     Camera away = camera();
@@ -57,7 +57,7 @@ TEST(Select, Rectangle_takes_its_corners_in_any_order) {
 TEST(Select, Lasso_is_even_odd_and_closed) {
     const SplatModel m = grid();
     const std::vector<glm::dvec2> corner = {{50, 50}, {350, 50}, {50, 350}};
-    const SplatMask mask = in_lasso(m, camera(), corner);
+    const SplatSet mask = in_lasso(m, camera(), corner);
     EXPECT_EQ(count(mask), 3);  // (100, 100), (200, 100), (100, 200)
     EXPECT_EQ(mask[0] + mask[1] + mask[5], 3);
     EXPECT_EQ(count(in_lasso(m, camera(), {})), 0);
@@ -81,7 +81,7 @@ TEST(Select, A_long_brush_is_as_its_segments_are) {
     std::vector<glm::dvec2> stroke;
     for (int i = 0; i < 60; ++i) stroke.emplace_back(300 + 4 * i * std::cos(i), 300 + 3 * i);
     for (const double radius : {3.0, 17.0, 90.0}) {
-        const SplatMask mask = under_brush(m, camera(), stroke, radius);
+        const SplatSet mask = under_brush(m, camera(), stroke, radius);
         for (size_t i = 0; i < m.size(); ++i) {
             const glm::dvec2 at(300 + 100.0 * double{m.position[3 * i]},
                                 300 + 100.0 * double{m.position[3 * i + 1]});
@@ -101,7 +101,7 @@ TEST(Select, Values_have_both_ends) {
     const SplatModel m = grid();
     EXPECT_EQ(count(by_opacity(m, 0.5, 1)), 13);
     EXPECT_EQ(count(by_scale(m, 0.95, 1.15)), 2);  // 1 and 1.1: the largest axis counts
-    const SplatMask red = by_colour(m, {1, 0.5, 0.5}, 0.05);
+    const SplatSet red = by_colour(m, {1, 0.5, 0.5}, 0.05);
     EXPECT_EQ(count(red), 1);
     EXPECT_EQ(red[7], 1);
     EXPECT_EQ(count(in_region(m, {Region::Shape::sphere, {0, 0, 5}, glm::dvec3(1.1)})), 5);
@@ -110,12 +110,12 @@ TEST(Select, Values_have_both_ends) {
 TEST(Select, Grown_adds_what_is_near_wherever_the_origin_is) {
     SplatModel m = grid();
     m.origin = {-1e5, 3, 77};
-    SplatMask mask(25, 0);
+    SplatSet mask(25, 0);
     mask[12] = 1;
     EXPECT_EQ(count(grown(m, mask, 1.1)), 5);
     EXPECT_EQ(count(grown(m, mask, 1.5)), 9);
     EXPECT_EQ(count(grown(m, mask, 0.9)), 1);
-    EXPECT_EQ(count(grown(m, SplatMask(25, 0), 3)), 0);
+    EXPECT_EQ(count(grown(m, SplatSet(25, 0), 3)), 0);
 }
 
 TEST(Gizmo, A_drag_along_an_axis_moves_by_as_much_as_the_hand) {
