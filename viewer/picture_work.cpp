@@ -55,23 +55,10 @@ void AccuracyMeasure::step(
     ++next_;
 }
 
-namespace {
-
-constexpr std::size_t kMostAsked = 48;
-
-std::vector<Camera> some_of(const std::vector<Camera>& cameras) {
-    std::vector<Camera> some;
-    const std::size_t count = std::min(kMostAsked, cameras.size());
-    for (std::size_t i = 0; i < count; ++i) some.push_back(cameras[i * cameras.size() / count]);
-    return some;
-}
-
-}  // namespace
-
 FreeSpaceSearch::FreeSpaceSearch(Device& device, const SplatModel& model,
                                  const std::vector<Camera>& cameras,
                                  const FreeSpaceOptions& options)
-    : cameras_(some_of(cameras)), renderer_(device, model), space_(model, options) {}
+    : cameras_(evenly_chosen(cameras)), renderer_(device, model), space_(model, options) {}
 
 namespace {
 

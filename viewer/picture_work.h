@@ -80,7 +80,7 @@ class PictureWork {
     void start_export(const CameraPath& path, const ExportOptions& options);
     void start_measure(const Camera& camera, const DisplaySettings& display,
                        const DisplaySettings& own);
-    /// model: must stay as it is until the search ends. cameras: at most 48 of them are asked.
+    /// model: must stay as it is until the search ends. cameras: see evenly_chosen.
     void start_search(Device& device, const SplatModel& model, const std::vector<Camera>& cameras,
                       const FreeSpaceOptions& options);
     void cancel();

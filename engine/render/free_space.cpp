@@ -15,13 +15,20 @@ constexpr std::size_t kSplatsAtATime = 4096;  // splats of a thread at a time
 constexpr double kEnds = 2;                 // standard deviations from a splat's centre to its end
 constexpr std::uint32_t kTimesAsOften = 4;  // floating, for each view that sees it at a surface
 
+}  // namespace
+
+std::vector<Camera> evenly_chosen(const std::vector<Camera>& cameras, std::size_t most) {
+    std::vector<Camera> chosen;
+    const std::size_t count = std::min(most, cameras.size());
+    for (std::size_t i = 0; i < count; ++i) chosen.push_back(cameras[i * cameras.size() / count]);
+    return chosen;
+}
+
 Camera pinhole_at_most(Camera camera, int width) {
     camera.lens = {};
     if (camera.width <= width) return camera;
     return resized(camera, width, std::max(1, camera.height * width / camera.width));
 }
-
-}  // namespace
 
 FreeSpace::FreeSpace(const SplatModel& model, const FreeSpaceOptions& options)
     : model_(&model), options_(options), sizes_(largest_deviations(model)), votes_(model.size()) {}

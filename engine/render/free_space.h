@@ -2,6 +2,7 @@
 // Which splats float in space that a scene's cameras look through.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -24,6 +25,11 @@ struct FreeSpaceOptions {
     int width = 640;  // px; wider cameras are scaled down
     float near_plane = static_cast<float>(NEAR_DEFAULT);
 };
+
+/// At most `most` of the cameras, evenly chosen: so many are asked.
+std::vector<Camera> evenly_chosen(const std::vector<Camera>& cameras, std::size_t most = 48);
+/// The camera without its lens, and no wider than `width` px.
+Camera pinhole_at_most(Camera camera, int width);
 
 /// Asks one camera after another.
 class FreeSpace {

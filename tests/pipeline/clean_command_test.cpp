@@ -11,33 +11,24 @@
 #include "engine/scene/ply.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/run_command.h"
+#include "tests/support/splat_files.h"
 
 namespace darb::test {
 namespace {
 
 constexpr std::size_t kBallSplats = 800, kFarSplats = 12, kHazeSplats = 5;
 
-void put_clutter(const glm::dvec3& at, double size, float opacity_logit, SplatModel& m) {
-    for (int c = 0; c < 3; ++c) {
-        m.position.push_back(static_cast<float>(at[c]));
-        m.log_scale.push_back(static_cast<float>(std::log(size)));
-        m.sh_dc.push_back(0.5f);
-    }
-    for (const float w : {1.0f, 0.0f, 0.0f, 0.0f}) m.rotation.push_back(w);
-    m.opacity_logit.push_back(opacity_logit);
-}
-
 /// A ball of radius 1 at the origin, a small cluster at x = 1.6, and haze over the ball.
 std::string cluttered_scene() {
     SplatModel m;
     Pcg32 rng(4);
     for (std::size_t i = 0; i < kBallSplats; ++i)
-        put_clutter(glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal())), 0.08, 3,
-                    m);
+        append_splat(glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal())),
+                     glm::dvec3(0.08), 3, m);
     for (std::size_t i = 0; i < kFarSplats; ++i)
-        put_clutter({1.6 + 0.01 * double(i), 0, 0}, 0.03, 3, m);
+        append_splat({1.6 + 0.01 * double(i), 0, 0}, glm::dvec3(0.03), 3, m);
     for (std::size_t i = 0; i < kHazeSplats; ++i)
-        put_clutter({0.3 * double(i) - 0.6, 0, -1}, 0.7, -3.5, m);
+        append_splat({0.3 * double(i) - 0.6, 0, -1}, glm::dvec3(0.7), -3.5, m);
     const fs::path path = scratch() / "cluttered.ply";
     write_ply(path, m);
     return path.string();
@@ -88,6 +79,15 @@ TEST(CleanCommand, Shows_what_each_rule_would_take_and_writes_nothing) {
     EXPECT_EQ(report["output"], "");
 }
 
+// 0 is an answer: no part is light enough.
+TEST(CleanCommand, Leaves_out_nothing_below_a_share_of_0) {
+    const std::string json = scratch_file("nothing.json");
+    const Outcome o =
+        darb(fmt::format("clean '{}' --dry-run --isolated 0 --json '{}'", cluttered_scene(), json));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(read_json(json)["together"]["splats"], 0);
+}
+
 TEST(CleanCommand, Says_what_is_wrong) {
     const std::string scene = cluttered_scene();
     const auto refused = [&](const std::string& more, const std::string& words) {
@@ -106,6 +106,7 @@ TEST(CleanCommand, Says_what_is_wrong) {
     refused(to + "--region sphere:0,0,0,-1", "holds nothing");
     refused(to + "--region sphere:50,0,0,1", "nothing would be left");
     refused(to + "--haze 0.1", "--haze");
+    refused(to + "--haze 5,0.1", "an opacity of 0 to 1");
     refused("-o '" + scene + "'", scene);
     EXPECT_FALSE(fs::exists(scratch_file("never.ply")));
 }

@@ -16,6 +16,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "engine/plan/effect_plan.h"
@@ -40,15 +41,14 @@ namespace darb {
 namespace {
 
 constexpr double kIsolatedShare = 0.01;  // of the heaviest part, where no rule is named
-constexpr std::size_t kMostViews = 48;   // cameras that are asked
 constexpr int kLightWidth = 480;         // px, of the pictures whose light is measured
 
 struct CleanFlags {
     std::filesystem::path scene, photos, cameras, output, json;
-    double isolated = 0;                          // share of the heaviest part; 0: off
+    std::optional<double> isolated;               // share of the heaviest part
     std::string haze;                             // OPACITY,SIZE; empty: off
     std::uint32_t free_space = 0, few_views = 0;  // views; 0: off
-    std::string region, device, effects = "auto";
+    std::string region, device;
     bool dry_run = false, force = false, quiet = false;
     DatasetOptions data;
     StoredUnits units;
@@ -75,18 +75,7 @@ Cameras chosen_cameras(const CleanFlags& flags, const SplatModel& model,
     if (views.empty() && !flags.cameras.empty()) views = open_cameras(flags.cameras, flags.data);
     if (views.empty()) views = cameras_beside(flags.scene);
     if (views.empty()) return {orbit_cameras(model, kAround, kWidth, kHeight), false};
-    Cameras chosen{{}, true};
-    const std::size_t count = std::min(kMostViews, views.size());
-    for (std::size_t i = 0; i < count; ++i)
-        chosen.cameras.push_back(views[i * views.size() / count].camera);
-    return chosen;
-}
-
-Camera small_pinhole(const Camera& camera) {
-    Camera pinhole = camera;
-    pinhole.lens = {};
-    if (pinhole.width <= kLightWidth) return pinhole;
-    return resized(pinhole, kLightWidth, std::max(1, pinhole.height * kLightWidth / pinhole.width));
+    return {evenly_chosen(cameras_of(views)), true};
 }
 
 Region region_from(const std::string& text, const SplatModel& model, const Cameras& cameras) {
@@ -137,20 +126,25 @@ class Cleaning {
     /// Mean over the cameras.
     double light_of(const SplatSet& set) const {
         if (count_of(set) == 0) return 0;
-        std::vector<Camera> small;
-        for (const Camera& camera : cameras_.cameras) small.push_back(small_pinhole(camera));
-        const std::vector<double> shares = light_shares(device_, model_, set, small);
+        const std::vector<double> shares = light_shares(device_, model_, set, small_pictures());
         return std::accumulate(shares.begin(), shares.end(), 0.0) / double(shares.size());
     }
 
   private:
     bool nothing_named() const {
-        return flags_.isolated == 0 && flags_.haze.empty() && flags_.free_space == 0 &&
+        return !flags_.isolated && flags_.haze.empty() && flags_.free_space == 0 &&
                flags_.few_views == 0 && flags_.region.empty();
     }
 
+    std::vector<Camera> small_pictures() const {
+        std::vector<Camera> small;
+        for (const Camera& camera : cameras_.cameras)
+            small.push_back(pinhole_at_most(camera, kLightWidth));
+        return small;
+    }
+
     void add_from_splats() {
-        const double isolated = nothing_named() ? kIsolatedShare : flags_.isolated;
+        const double isolated = flags_.isolated.value_or(nothing_named() ? kIsolatedShare : 0.0);
         if (!flags_.region.empty()) {
             const Region region = region_from(flags_.region, model_, cameras_);
             SplatSet outside(model_.size());
@@ -161,6 +155,10 @@ class Cleaning {
         if (isolated > 0) rules_.push_back({"isolated parts", isolated_splats(model_, isolated)});
         if (!flags_.haze.empty()) {
             const std::vector<double> haze = numbers_from("--haze", flags_.haze, 2);
+            if (!(haze[0] >= 0 && haze[0] <= 1 && haze[1] > 0))
+                throw Error("--haze " + flags_.haze, "is not an opacity and a size",
+                            "Give an opacity of 0 to 1 and how many times the median size, as "
+                            "--haze 0.1,5.");
             rules_.push_back({"haze", hazy_splats(model_, haze[0], haze[1])});
         }
     }
@@ -181,9 +179,8 @@ class Cleaning {
             rules_.push_back({"in free space", space.splats()});
         }
         if (flags_.few_views > 0) {
-            std::vector<Camera> small;
-            for (const Camera& camera : cameras_.cameras) small.push_back(small_pinhole(camera));
-            const std::vector<std::uint32_t> views = views_that_see(device_, model_, small);
+            const std::vector<std::uint32_t> views =
+                views_that_see(device_, model_, small_pictures());
             SplatSet few(model_.size());
             for (std::size_t i = 0; i < few.size(); ++i)
                 few[i] = views[i] > 0 && views[i] < flags_.few_views ? 1 : 0;
@@ -223,6 +220,7 @@ std::optional<Judgement> judge(Device& device, const Dataset& photos, const Effe
     SceneEvaluation options;
     options.effects = effects;
     options.alpha_is_mask = photos.alpha_is_mask;
+    options.depth_scale = photos.depth_scale;
     SlowProgress progress("measuring held-out photos");
     progress.at(0.0);
     Judgement judged{views.size()};
@@ -300,12 +298,15 @@ int clean(CleanFlags flags) {
     const SplatFormat format = flags.dry_run ? SplatFormat::ply : checked_format(flags);
     if (!flags.dry_run) written.check({flags.output});
     hold_out_as_trained(flags.scene, flags.data);
-    const EffectChoice effects = choose_effects(flags.effects, EffectUse::measuring, flags.data);
+    const EffectChoice effects = choose_effects("auto", EffectUse::measuring, flags.data);
     SplatModel model = load_scene(flags.scene, nullptr, flags.units);
     if (model.size() == 0)
         throw Error(flags.scene.string(), "the scene has no splats", "Clean one that has some.");
     Dataset photos;
-    if (!flags.photos.empty()) photos = load_dataset(flags.photos, flags.data);
+    if (!flags.photos.empty()) {
+        photos = load_dataset(flags.photos, flags.data);
+        take_trained_cameras(flags.scene, photos.views);
+    }
     say_notes(photos.notes);
     const Cameras cameras = chosen_cameras(flags, model, photos.views);
     if (!cameras.of_photos && (flags.free_space > 0 || flags.few_views > 0))
@@ -386,7 +387,6 @@ void add_clean(CLI::App& app, Action& action) {
     command->add_option("-r,--resolution", flags->data.resolution,
                         "of the photos: 1, 2, 4 or 8 to divide their size, or a width in px");
     add_json_option(*command, flags->json);
-    add_effects_flag(*command, flags->effects);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
     add_quiet_flag(*command, flags->quiet);

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <nlohmann/json_fwd.hpp>
@@ -16,7 +15,6 @@
 #include "engine/core/error.h"
 #include "engine/core/parse_number.h"
 #include "engine/core/say.h"
-#include "engine/data/camera_list.h"
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "engine/plan/effect_plan.h"
@@ -55,13 +53,6 @@ LightReport measure_light(Device& device, const SplatModel& model, const EffectC
 
 /// Prints the report and returns it as JSON.
 nlohmann::json told_light(std::FILE* out, const LightReport& light);
-
-// The cameras with which a run ended, where it refined them.
-
-/// Takes the cameras of the same names from the cameras.json of the scene's run, at the sizes of
-/// these views, and says so in a note. Does nothing where the run refined none. Throws Error where
-/// the file is not one that a run leaves.
-void take_trained_cameras(const std::filesystem::path& scene, std::vector<View>& views);
 
 namespace {
 
@@ -293,34 +284,6 @@ nlohmann::json told_light(std::FILE* out, const LightReport& light) {
     for (const auto& [name, share] : means)
         if (share) json[name] = *share;
     return json;
-}
-
-namespace fs = std::filesystem;
-
-void take_trained_cameras(const fs::path& scene, std::vector<View>& views) {
-    const fs::path log = log_of_run(scene);
-    if (log.empty()) return;
-    const nlohmann::json start = start_of_run(log);
-    const nlohmann::json::json_pointer refined("/settings/effects/cameras");
-    if (!start.is_object() || !start.contains(refined) || start[refined] != true) return;
-    const fs::path file = log.parent_path() / "cameras.json";
-    std::map<std::string, Camera> trained;
-    for (const View& view : load_cameras(file)) trained[view.name] = view.camera;
-    std::size_t taken = 0;
-    for (View& view : views) {
-        const auto at = trained.find(view.name);
-        if (at == trained.end()) continue;
-        const Camera& from = at->second;
-        Camera& to = view.camera;
-        const double x = double(to.width) / from.width, y = double(to.height) / from.height;
-        to.rotation = from.rotation;
-        to.translation = from.translation;
-        to.fx = from.fx * x, to.cx = from.cx * x;
-        to.fy = from.fy * y, to.cy = from.cy * y;
-        ++taken;
-    }
-    say_note(fmt::format("cameras: {} of {} as {} has them, refined", taken, views.size(),
-                         file.string()));
 }
 
 }  // namespace darb

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -10,11 +11,13 @@
 
 #include "engine/core/say.h"
 #include "engine/core/text.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/depths.h"
 #include "engine/data/metrics.h"
 #include "engine/raster/frame_view.h"
 #include "engine/render/renderer.h"
 #include "tools/paper/compare_stats.h"
+#include "trainer/job/scene_file.h"
 #include "trainer/run/run_report.h"
 #include "trainer/step/camera_refinement.h"
 #include "trainer/step/exposure.h"
@@ -189,6 +192,32 @@ void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales) {
              fmt::format("{} x {}", at.width, at.height), at.evaluation.psnr_db, at.evaluation.ssim,
              arc ? fmt::format("  {:>7.3f}  {:>7.4f}", arc->psnr_db, arc->ssim) : "");
     }
+}
+
+void take_trained_cameras(const std::filesystem::path& scene, std::vector<View>& views) {
+    const std::filesystem::path log = log_of_run(scene);
+    if (log.empty()) return;
+    const nlohmann::json start = start_of_run(log);
+    const nlohmann::json::json_pointer refined("/settings/effects/cameras");
+    if (!start.is_object() || !start.contains(refined) || start[refined] != true) return;
+    const std::filesystem::path file = log.parent_path() / "cameras.json";
+    std::map<std::string, Camera> trained;
+    for (const View& view : load_cameras(file)) trained[view.name] = view.camera;
+    std::size_t taken = 0;
+    for (View& view : views) {
+        const auto at = trained.find(view.name);
+        if (at == trained.end()) continue;
+        const Camera& from = at->second;
+        Camera& to = view.camera;
+        const double x = double(to.width) / from.width, y = double(to.height) / from.height;
+        to.rotation = from.rotation;
+        to.translation = from.translation;
+        to.fx = from.fx * x, to.cx = from.cx * x;
+        to.fy = from.fy * y, to.cy = from.cy * y;
+        ++taken;
+    }
+    say_note(fmt::format("cameras: {} of {} as {} has them, refined", taken, views.size(),
+                         file.string()));
 }
 
 }  // namespace darb

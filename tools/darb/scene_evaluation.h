@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdio>
+#include <filesystem>
 #include <glm/vec3.hpp>
 #include <nlohmann/json_fwd.hpp>
 #include <vector>
@@ -56,5 +57,12 @@ void print_evaluation(std::FILE* out, const Evaluation& evaluation);
 void print_depth(std::FILE* out, const Evaluation& evaluation);
 /// Prints a line for each scale: the means over its views.
 void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales);
+
+// The cameras with which a run ended, where it refined them.
+
+/// Takes the cameras of the same names from the cameras.json of the scene's run, at the sizes of
+/// these views, and says so in a note. Does nothing where the run refined none. Throws Error where
+/// the file is not one that a run leaves.
+void take_trained_cameras(const std::filesystem::path& scene, std::vector<View>& views);
 
 }  // namespace darb
