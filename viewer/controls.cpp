@@ -50,8 +50,8 @@ void edit_by_key(Session& s, std::size_t (*edit)(Edit&)) {
     if (s.scene && !s.edit.transforms()) show_edit(edit(s.edit), s);
 }
 
-SplatMask all_of(const Edit& edit, std::uint8_t value) {
-    return SplatMask(edit.removed().size(), value);
+SplatSet all_of(const Edit& edit, std::uint8_t value) {
+    return SplatSet(edit.removed().size(), value);
 }
 
 void stop_and_close(Session& s) {

@@ -25,8 +25,8 @@ constexpr std::size_t kPiece = 1 << 15;  // splats for each thread
 
 /// has: a predicate of a splat's index; must not throw.
 template <class Has>
-SplatMask mask_of(const SplatModel& model, const Has& has) {
-    SplatMask mask(model.size());
+SplatSet mask_of(const SplatModel& model, const Has& has) {
+    SplatSet mask(model.size());
     in_pieces(mask.size(), kPiece, [&](std::size_t first, std::size_t count) {
         for (std::size_t i = first; i < first + count; ++i) mask[i] = has(i) ? 1 : 0;
     });
@@ -35,7 +35,7 @@ SplatMask mask_of(const SplatModel& model, const Has& has) {
 
 /// has: a predicate of the px of a splat's centre.
 template <class Has>
-SplatMask on_screen(const SplatModel& model, const Camera& camera, const Has& has) {
+SplatSet on_screen(const SplatModel& model, const Camera& camera, const Has& has) {
     Camera from_origin = camera;  // its world begins at the model's origin
     from_origin.translation += camera.rotation * model.origin;
     return mask_of(model, [&](std::size_t i) {
@@ -178,37 +178,37 @@ class CubeGrid {
 
 }  // namespace
 
-SplatMask in_rectangle(const SplatModel& model, const Camera& camera, glm::dvec2 a, glm::dvec2 b) {
+SplatSet in_rectangle(const SplatModel& model, const Camera& camera, glm::dvec2 a, glm::dvec2 b) {
     const glm::dvec2 low = glm::min(a, b), high = glm::max(a, b);
     return on_screen(model, camera, [&](const glm::dvec2& p) {
         return p.x >= low.x && p.y >= low.y && p.x <= high.x && p.y <= high.y;
     });
 }
 
-SplatMask in_lasso(const SplatModel& model, const Camera& camera,
-                   const std::vector<glm::dvec2>& lasso) {
+SplatSet in_lasso(const SplatModel& model, const Camera& camera,
+                  const std::vector<glm::dvec2>& lasso) {
     const LassoRows rows(lasso);
     return on_screen(model, camera, [&](const glm::dvec2& p) { return rows.has(p); });
 }
 
-SplatMask under_brush(const SplatModel& model, const Camera& camera,
-                      const std::vector<glm::dvec2>& stroke, double radius) {
+SplatSet under_brush(const SplatModel& model, const Camera& camera,
+                     const std::vector<glm::dvec2>& stroke, double radius) {
     const BrushCells cells(stroke, radius);
     return on_screen(model, camera, [&](const glm::dvec2& p) { return cells.has(p); });
 }
 
-SplatMask in_region(const SplatModel& model, const Region& region) {
+SplatSet in_region(const SplatModel& model, const Region& region) {
     return mask_of(model, [&](std::size_t i) { return region.contains(position_of(model, i)); });
 }
 
-SplatMask by_opacity(const SplatModel& model, double low, double high) {
+SplatSet by_opacity(const SplatModel& model, double low, double high) {
     return mask_of(model, [&](std::size_t i) {
         const double opacity = sigmoid(double{model.opacity_logit[i]});
         return opacity >= low && opacity <= high;
     });
 }
 
-SplatMask by_scale(const SplatModel& model, double low, double high) {
+SplatSet by_scale(const SplatModel& model, double low, double high) {
     return mask_of(model, [&](std::size_t i) {
         const float* s = &model.log_scale[3 * i];
         const double scale = std::exp(double{std::max({s[0], s[1], s[2]})});
@@ -221,20 +221,20 @@ glm::dvec3 base_colour(const SplatModel& model, std::size_t splat) {
     return 0.5 + kColourOfDc * glm::dvec3(dc[0], dc[1], dc[2]);
 }
 
-SplatMask by_colour(const SplatModel& model, const glm::dvec3& colour, double tolerance) {
+SplatSet by_colour(const SplatModel& model, const glm::dvec3& colour, double tolerance) {
     return mask_of(model, [&](std::size_t i) {
         const glm::dvec3 d = glm::abs(glm::clamp(base_colour(model, i), 0.0, 1.0) - colour);
         return std::max({d.x, d.y, d.z}) <= tolerance;
     });
 }
 
-SplatMask grown(const SplatModel& model, const SplatMask& mask, double distance) {
+SplatSet grown(const SplatModel& model, const SplatSet& mask, double distance) {
     DARB_CHECK(mask.size() == model.size() && distance > 0, "{} splats, {}, {}", model.size(),
                mask.size(), distance);
     CubeGrid grid(distance, model.origin);
     for (std::size_t i = 0; i < mask.size(); ++i)
         if (mask[i] != 0) grid.add(position_of(model, i));
-    SplatMask result = mask;
+    SplatSet result = mask;
     for (std::size_t i = 0; i < mask.size(); ++i)
         if (mask[i] == 0 && grid.any_nearer(position_of(model, i))) result[i] = 1;
     return result;
@@ -283,7 +283,7 @@ void raise_sh_degree(int degree, SplatModel& model) {
 }  // namespace
 
 void Edit::flip(const Marks& marks) {
-    const auto turn = [](const std::vector<std::uint32_t>& splats, SplatMask& mask,
+    const auto turn = [](const std::vector<std::uint32_t>& splats, SplatSet& mask,
                          std::size_t& count) {
         for (const std::uint32_t i : splats) {
             mask[i] ^= 1;
@@ -314,7 +314,7 @@ std::size_t Edit::mark(const char* verb, Marks marks, bool content) {
     return changed;
 }
 
-std::size_t Edit::select(const SplatMask& mask, Combine how) {
+std::size_t Edit::select(const SplatSet& mask, Combine how) {
     DARB_CHECK(mask.size() == selected_.size(), "{} splats, {}", mask.size(), selected_.size());
     Marks marks;
     for (std::size_t i = 0; i < mask.size(); ++i) {
@@ -329,12 +329,12 @@ std::size_t Edit::select(const SplatMask& mask, Combine how) {
 }
 
 std::size_t Edit::invert_selection() {
-    SplatMask mask(selected_.size());
+    SplatSet mask(selected_.size());
     for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = selected_[i] ^ 1;
     return select(mask, Combine::replace);
 }
 
-std::size_t Edit::remove(const SplatMask& mask) {
+std::size_t Edit::remove(const SplatSet& mask) {
     DARB_CHECK(mask.size() == removed_.size(), "{} splats, {}", mask.size(), removed_.size());
     Marks marks;
     for (std::size_t i = 0; i < mask.size(); ++i) {
@@ -346,7 +346,7 @@ std::size_t Edit::remove(const SplatMask& mask) {
 }
 
 std::size_t Edit::remove(const SplatModel& model, const Region& region, bool inside) {
-    SplatMask mask = in_region(model, region);
+    SplatSet mask = in_region(model, region);
     for (std::uint8_t& hit : mask) hit = (hit != 0) == inside ? 1 : 0;
     return remove(mask);
 }
@@ -420,7 +420,7 @@ void Edit::append(const Merged& merged, SplatModel& model) {
         values.insert(values.end(), more.begin(), more.end());
     }
     for (const std::uint32_t i : merged.selected) selected_[i] = 0;
-    for (SplatMask* mask : {&removed_, &hidden_}) mask->resize(model.size(), 0);
+    for (SplatSet* mask : {&removed_, &hidden_}) mask->resize(model.size(), 0);
     selected_.resize(model.size(), 1);
     selected_count_ = added.size();
     changed_model();
@@ -428,7 +428,7 @@ void Edit::append(const Merged& merged, SplatModel& model) {
 
 void Edit::cut(const Merged& merged, SplatModel& model) {
     const std::size_t left = model.size() - merged.added.size();
-    for (SplatMask* mask : {&removed_, &hidden_, &selected_}) mask->resize(left);
+    for (SplatSet* mask : {&removed_, &hidden_, &selected_}) mask->resize(left);
     for (const std::uint32_t i : merged.selected) selected_[i] = 1;
     selected_count_ = merged.selected.size();
     model.resize(left);
@@ -510,8 +510,8 @@ const std::string& Edit::last() const {
     return done_ > 0 ? steps_[done_ - 1].what : none;
 }
 
-SplatMask Edit::unseen() const {
-    SplatMask mask = removed_;
+SplatSet Edit::unseen() const {
+    SplatSet mask = removed_;
     for (std::size_t i = 0; i < mask.size(); ++i) mask[i] |= hidden_[i];
     return mask;
 }

@@ -13,34 +13,32 @@
 #include <vector>
 
 #include "engine/scene/camera.h"
+#include "engine/scene/clutter.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
 
-/// [N], 1 for splats that are in the set.
-using SplatMask = std::vector<std::uint8_t>;
-
 /// a and b are opposite corners, px.
-SplatMask in_rectangle(const SplatModel& model, const Camera& camera, glm::dvec2 a, glm::dvec2 b);
+SplatSet in_rectangle(const SplatModel& model, const Camera& camera, glm::dvec2 a, glm::dvec2 b);
 /// The outline in px; its ends are joined, and the even-odd rule decides what is inside.
-SplatMask in_lasso(const SplatModel& model, const Camera& camera,
-                   const std::vector<glm::dvec2>& lasso);
+SplatSet in_lasso(const SplatModel& model, const Camera& camera,
+                  const std::vector<glm::dvec2>& lasso);
 /// Splats within the radius of the line through the points, px.
-SplatMask under_brush(const SplatModel& model, const Camera& camera,
-                      const std::vector<glm::dvec2>& stroke, double radius);
-SplatMask in_region(const SplatModel& model, const Region& region);
+SplatSet under_brush(const SplatModel& model, const Camera& camera,
+                     const std::vector<glm::dvec2>& stroke, double radius);
+SplatSet in_region(const SplatModel& model, const Region& region);
 /// By opacity, 0 to 1.
-SplatMask by_opacity(const SplatModel& model, double low, double high);
+SplatSet by_opacity(const SplatModel& model, double low, double high);
 /// By the largest standard deviation, world units.
-SplatMask by_scale(const SplatModel& model, double low, double high);
+SplatSet by_scale(const SplatModel& model, double low, double high);
 /// By colour without harmonics above degree 0; all channels must be within the tolerance, sRGB 0 to
 /// 1.
-SplatMask by_colour(const SplatModel& model, const glm::dvec3& colour, double tolerance);
+SplatSet by_colour(const SplatModel& model, const glm::dvec3& colour, double tolerance);
 /// The base colour, sRGB, not clamped.
 glm::dvec3 base_colour(const SplatModel& model, std::size_t splat);
 /// Adds all splats nearer than `distance` (world units, above 0) to one of the mask.
-SplatMask grown(const SplatModel& model, const SplatMask& mask, double distance);
+SplatSet grown(const SplatModel& model, const SplatSet& mask, double distance);
 
 /// How a new selection is combined with the one before.
 enum class Combine { replace, add, subtract };
@@ -52,9 +50,9 @@ class Edit {
 
     // Each of these is a step unless it changes nothing. They return how many splats changed.
     // Hidden and deleted splats are never selected.
-    std::size_t select(const SplatMask& mask, Combine how);
+    std::size_t select(const SplatSet& mask, Combine how);
     std::size_t invert_selection();
-    std::size_t remove(const SplatMask& mask);
+    std::size_t remove(const SplatSet& mask);
     std::size_t remove_selected() { return remove(selected_); }
     std::size_t hide_selected();
     std::size_t show_hidden();
@@ -96,10 +94,10 @@ class Edit {
     /// Grows with each change of anything.
     int version() const { return version_; }
 
-    const SplatMask& removed() const { return removed_; }    // [N]
-    const SplatMask& selected() const { return selected_; }  // [N]
+    const SplatSet& removed() const { return removed_; }    // [N]
+    const SplatSet& selected() const { return selected_; }  // [N]
     /// Deleted or hidden, [N].
-    SplatMask unseen() const;
+    SplatSet unseen() const;
     std::size_t removed_count() const { return removed_count_; }
     std::size_t hidden_count() const { return hidden_count_; }
     std::size_t selected_count() const { return selected_count_; }
@@ -139,7 +137,7 @@ class Edit {
     std::vector<std::uint32_t> moved_splats() const;
     void changed_model() { ++model_version_, ++seen_version_, ++version_; }
 
-    SplatMask removed_, hidden_, selected_;
+    SplatSet removed_, hidden_, selected_;
     std::vector<Step> steps_;
     std::size_t done_ = 0;  // how many of steps_ are done
     std::size_t removed_count_ = 0, hidden_count_ = 0, selected_count_ = 0;

@@ -125,7 +125,7 @@ void Painter::show_marks(bool highlight) {
     lose_levels();  // levels have no marks
     ++version_;
     picture_.set_marks(edit.unseen(),
-                       highlight ? edit.selected() : SplatMask(edit.selected().size(), 0));
+                       highlight ? edit.selected() : SplatSet(edit.selected().size(), 0));
 }
 
 void Painter::begin_run() {

@@ -124,7 +124,7 @@ bool has_gizmo(Tool tool) {
     return tool == Tool::move || tool == Tool::turn || tool == Tool::scale;
 }
 
-SplatMask stroke_mask(const Session& s, const Camera& camera) {
+SplatSet stroke_mask(const Session& s, const Camera& camera) {
     const SplatModel& m = s.scene->model;
     const ToolState& t = s.tools;
     switch (t.tool) {
@@ -142,7 +142,7 @@ SplatMask stroke_mask(const Session& s, const Camera& camera) {
         default:
             break;
     }
-    return SplatMask(m.size(), 0);
+    return SplatSet(m.size(), 0);
 }
 
 void begin_stroke(const Input& in, const Camera& camera, Session& s) {
@@ -158,7 +158,7 @@ void begin_stroke(const Input& in, const Camera& camera, Session& s) {
 
 void end_stroke(const Camera& camera, Session& s) {
     ToolState& t = s.tools;
-    const SplatMask mask = stroke_mask(s, camera);
+    const SplatSet mask = stroke_mask(s, camera);
     t.drawing = false;
     t.stroke.clear();
     t.sphere.reset();
@@ -170,7 +170,7 @@ void find_centre(Session& s) {
     ToolState& t = s.tools;
     if (t.centre_version == s.edit.version()) return;
     t.centre_version = s.edit.version();
-    const SplatMask unseen = s.edit.unseen();
+    const SplatSet unseen = s.edit.unseen();
     const bool some = s.edit.selected_count() > 0;
     glm::dvec3 sum(0.0);
     double count = 0;

@@ -50,7 +50,8 @@ bool touch(const Extent& a, const Extent& b) {
 /// Those splats of a model that are drawn, with a tree of their means.
 class Extents {
   public:
-    Extents(const SplatModel& model, std::vector<double>& mass) : mass_(mass) {
+    /// mass: [N], to be filled.
+    Extents(const SplatModel& model, std::vector<double>& mass) {
         for (std::size_t i = 0; i < model.size(); ++i) {
             if (!is_finite(model, i) || !has_rotation(model, i)) continue;
             if (sigmoid(double{model.opacity_logit[i]}) < undrawn_below(ALPHA_CUTOFF_DEFAULT))
@@ -61,7 +62,7 @@ class Extents {
             extents_.push_back(
                 {m.mean, m.covariance, std::exp(double{std::max({s[0], s[1], s[2]})})});
             means_.push_back(m.mean);
-            mass_[i] = m.mass;
+            mass[i] = m.mass;
         }
         tree_.buildIndex();
     }
@@ -100,7 +101,6 @@ class Extents {
     }
 
   private:
-    std::vector<double>& mass_;
     std::vector<std::uint32_t> splats_;
     std::vector<Extent> extents_;
     std::vector<glm::dvec3> means_;

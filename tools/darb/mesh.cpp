@@ -420,10 +420,6 @@ void check_output(const MeshFlags& flags) {
         flags.output.extension().empty())
         throw Error(flags.output.string(), "has no ending of a mesh",
                     "Use " + mesh_endings() + ".");
-    if (flags.method == "opacity" && flags.reading == "expected")
-        throw Error("--depth expected",
-                    "is a mean of depths, and says of no point what is before it",
-                    "Use --depth front, solid or plane with --method opacity.");
     if (has_pages(flags.mesh.texture) && has_extension(flags.output, ".ply"))
         throw Error(flags.output.string(), "a .ply has no place for a texture",
                     "Write .glb, .gltf or .obj, or take --texture vertex.");

@@ -93,7 +93,7 @@ void tool_choice(Session& s) {
     tip("Radius of the brush on the screen");
 }
 
-void select(const SplatMask& mask, Session& s) {
+void select(const SplatSet& mask, Session& s) {
     const ImGuiIO& io = ImGui::GetIO();
     show_edit(s.edit.select(mask, io.KeyShift  ? Combine::add
                                   : io.KeyCtrl ? Combine::subtract
@@ -105,10 +105,10 @@ void selection_buttons(Session& s) {
     const SplatModel& model = s.scene->model;
     ImGui::Text("%zu selected, %zu hidden, %zu deleted", s.edit.selected_count(),
                 s.edit.hidden_count(), s.edit.removed_count());
-    if (ImGui::Button("All")) select(SplatMask(model.size(), 1), s);
+    if (ImGui::Button("All")) select(SplatSet(model.size(), 1), s);
     tip("Ctrl+A");
     ImGui::SameLine();
-    if (ImGui::Button("None")) select(SplatMask(model.size(), 0), s);
+    if (ImGui::Button("None")) select(SplatSet(model.size(), 0), s);
     tip("Ctrl+D");
     ImGui::SameLine();
     if (ImGui::Button("Invert")) show_edit(s.edit.invert_selection(), s);
