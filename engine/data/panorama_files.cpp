@@ -6,6 +6,8 @@
 
 #include <array>
 #include <cstdint>
+#include <fstream>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -128,6 +130,56 @@ std::vector<std::byte> encode_panorama_png(const ImageU8& image) {
 
 void write_panorama_png(const std::filesystem::path& path, const ImageU8& image) {
     write_file_atomic(path, encode_panorama_png(image));
+}
+
+namespace {
+
+std::string_view text_of(std::span<const std::byte> bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// Whether "ProjectionType" is followed by "equirectangular", as an attribute or an element.
+bool says_equirectangular(std::string_view text) {
+    constexpr std::string_view kName = "ProjectionType", kValue = "equirectangular";
+    constexpr std::size_t kBetween = 8;  // =" or > and blanks
+    for (std::size_t at = 0; (at = text.find(kName, at)) != std::string_view::npos;) {
+        at += kName.size();
+        if (text.substr(at, kBetween + kValue.size()).find(kValue) != std::string_view::npos)
+            return true;
+    }
+    return false;
+}
+
+}  // namespace
+
+bool is_marked_panorama(std::span<const std::byte> head) {
+    return says_equirectangular(text_of(head));
+}
+
+bool is_marked_panorama_video(const std::filesystem::path& path) {
+    constexpr std::uint64_t kMostIndex = 1 << 28;  // bytes; longer videos have some megabytes
+    std::ifstream file(path, std::ios::binary);
+    std::array<std::byte, 16> head{};
+    std::uint64_t at = 0;
+    while (file.seekg(static_cast<std::streamoff>(at)) &&
+           file.read(reinterpret_cast<char*>(head.data()), head.size())) {
+        std::uint64_t size = u32_at(head, 0);
+        if (size == 1) size = std::uint64_t{u32_at(head, 8)} << 32 | u32_at(head, 12);
+        if (size < 8) return false;
+        if (text_of(head).substr(4, 4) != "moov") {
+            if (size > std::numeric_limits<std::uint64_t>::max() / 2 - at) return false;
+            at += size;
+            continue;
+        }
+        std::string index(static_cast<std::size_t>(std::min(size, kMostIndex)), '\0');
+        file.seekg(static_cast<std::streamoff>(at));
+        file.read(index.data(), static_cast<std::streamsize>(index.size()));
+        index.resize(static_cast<std::size_t>(file.gcount()));
+        const std::size_t boxes = index.find("sv3d");
+        return says_equirectangular(index) ||
+               (boxes != std::string::npos && index.find("equi", boxes) != std::string::npos);
+    }
+    return false;
 }
 
 void mark_panorama_video(const std::filesystem::path& path) {

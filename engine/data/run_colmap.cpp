@@ -309,6 +309,11 @@ bool matches_neighbours(const ColmapRun& run) {
     return run.sequential || (run.effort == ColmapEffort::quick && run.quick_sequential);
 }
 
+const char* matcher_name(const ColmapRun& run) {
+    if (!run.pairs.empty()) return "matches_importer";
+    return matches_neighbours(run) ? "sequential_matcher" : "exhaustive_matcher";
+}
+
 ColmapCommand extractor(const ColmapRun& run, const ColmapPaths& paths, const ColmapHelp& help) {
     const std::string part = help.has_new_names() ? "Feature" : "Sift";
     // OPENCV suits phones and consumer cameras; the undistorter turns it into a pinhole.
@@ -321,9 +326,12 @@ ColmapCommand extractor(const ColmapRun& run, const ColmapPaths& paths, const Co
                           "--ImageReader.single_camera",
                           run.single_camera ? "1" : "0",
                           "--ImageReader.camera_model",
-                          "OPENCV",
+                          run.pinhole > 0 ? "PINHOLE" : "OPENCV",
                           "--" + part + "Extraction.use_gpu",
                           "0"};
+    if (run.pinhole > 0)
+        command.insert(command.end(), {"--ImageReader.camera_params",
+                                       fmt::format("{0},{0},{0},{0}", 0.5 * run.pinhole)});
     if (!run.masks.empty())
         command.insert(command.end(), {"--ImageReader.mask_path", run.masks.string()});
     const auto add = [&](std::initializer_list<const char*> names, const char* value) {
@@ -343,7 +351,7 @@ ColmapCommand matcher(const ColmapRun& run, const ColmapPaths& paths, const Colm
     const std::string part = help.has_new_names() ? "Feature" : "Sift";
     const bool neighbours = matches_neighbours(run), hard = run.effort == ColmapEffort::thorough;
     ColmapCommand command{"colmap",
-                          neighbours ? "sequential_matcher" : "exhaustive_matcher",
+                          matcher_name(run),
                           "--database_path",
                           paths.database.string(),
                           "--" + part + "Matching.use_gpu",
@@ -351,10 +359,13 @@ ColmapCommand matcher(const ColmapRun& run, const ColmapPaths& paths, const Colm
     const auto add = [&](std::initializer_list<const char*> names, const std::string& value) {
         add_option(command, help.matcher, names, value);
     };
-    if (!neighbours && run.count > 0)
+    if (!run.pairs.empty())
+        command.insert(command.end(),
+                       {"--match_list_path", run.pairs.string(), "--match_type", "pairs"});
+    else if (!neighbours && run.count > 0)
         add({"ExhaustiveMatching.block_size"}, std::to_string(block_size(run.count)));
     if (!hard) return command;
-    if (neighbours) add({"SequentialMatching.overlap"}, "20");
+    if (neighbours && run.pairs.empty()) add({"SequentialMatching.overlap"}, "20");
     add({"FeatureMatching.guided_matching", "SiftMatching.guided_matching"}, "1");
     add({"SiftMatching.max_ratio"}, "0.85");
     add({"TwoViewGeometry.min_num_inliers", "SiftMatching.min_num_inliers"}, "10");
@@ -366,6 +377,9 @@ ColmapCommand mapper(const ColmapRun& run, const ColmapPaths& paths, const Colma
                           "--database_path", paths.database.string(),
                           "--image_path",    run.photos.string(),
                           "--output_path",   paths.models.string()};
+    if (run.pinhole > 0)
+        for (const char* part : {"focal_length", "principal_point", "extra_params"})
+            command.insert(command.end(), {fmt::format("--Mapper.ba_refine_{}", part), "0"});
     if (run.effort != ColmapEffort::thorough) return command;
     const auto add = [&](const char* name, const char* value) {
         add_option(command, help.mapper, {name}, value);
@@ -444,6 +458,7 @@ class ColmapRunner {
         if (reports_.note) reports_.note(text);
     }
     void ask_for_help();
+    std::size_t pairs_of(const ColmapCommand& command) const;
     /// Throws Error where the command fails, unless may_fail.
     void step(ColmapStep step, const ColmapCommand& command, bool may_fail = false);
     Attempt attempt(std::size_t number, ColmapEffort effort);
@@ -490,14 +505,21 @@ void ColmapRunner::ask_for_help() {
         return colmap_output_of({"colmap", command, "-h"}, run_.stop);
     };
     help_.extractor = ask("feature_extractor") + "\n";  // not empty, to show that it was asked
-    help_.matcher = ask(matches_neighbours(run_) ? "sequential_matcher" : "exhaustive_matcher");
+    help_.matcher = ask(matcher_name(run_));
     if (run_.effort == ColmapEffort::thorough) help_.mapper = ask("mapper");
+}
+
+// The number of pairs that a matcher compares; 0: not known.
+std::size_t ColmapRunner::pairs_of(const ColmapCommand& command) const {
+    if (command[1] == "exhaustive_matcher") return photos_ * (photos_ - 1) / 2;
+    if (command[1] != "matches_importer") return 0;
+    const std::string list = read_text_file(run_.pairs);
+    return static_cast<std::size_t>(std::ranges::count(list, '\n'));
 }
 
 void ColmapRunner::step(ColmapStep step, const ColmapCommand& command, bool may_fail) {
     const std::size_t number = static_cast<std::size_t>(step) + 1;
-    const bool all_pairs = command[1] == "exhaustive_matcher";
-    ColmapOutput output(step, photos_, all_pairs ? photos_ * (photos_ - 1) / 2 : 0);
+    ColmapOutput output(step, photos_, pairs_of(command));
     note(fmt::format("[{}/{}] {}", number, kColmapSteps, shell_text(command)));
     std::ofstream log(run_.workspace / "colmap.log", std::ios::app);
     log << shell_text(command) << "\n";
@@ -605,7 +627,7 @@ void ColmapRunner::find_cameras() {
                              now.found > best->found ? "which" : "the one before"));
         if (!best || now.found > best->found) best = now;
         const bool enough =
-            photos_ > 0 ? double(best->found) >= kEnoughPhotos * double(photos_) : best->found > 0;
+            photos_ > 0 ? double(best->found) >= run_.enough * double(photos_) : best->found > 0;
         if (enough) break;
         if (i + 1 < efforts.size()) tell_next(best->found, efforts[i + 1]);
     }
@@ -669,6 +691,8 @@ fs::path ColmapRunner::data_set() {
     for (const fs::directory_entry& entry : fs::directory_iterator(run_.workspace, none))
         if (entry.path().filename().string().starts_with("attempt_")) remove_folder(entry.path());
     tell_models();
+    if (run_.pinhole > 0)
+        return run_.workspace / "sparse" / largest_colmap_model(run_.workspace / "sparse");
     undistort();
     return run_.workspace / "dense";
 }

@@ -58,6 +58,8 @@ double colmap_seconds_left(ColmapStep step, double seconds, std::size_t done, st
 /// fewer matches.
 enum class ColmapEffort { quick, usual, thorough };
 
+constexpr double kEnoughPhotos = 0.8;  // share of the photos
+
 struct ColmapRun {
     std::filesystem::path photos;      // a folder of PNG and JPEG files
     std::filesystem::path workspace;   // made where missing; holds the data set afterwards
@@ -68,7 +70,12 @@ struct ColmapRun {
     std::size_t count = 0;             // number of photos; 0: not known
     ColmapEffort effort = ColmapEffort::usual;  // the effort to begin with
     bool quick_sequential = false;              // match sequentially, but at the quick effort only
-    const std::atomic<bool>* stop = nullptr;    // when set: ends COLMAP, throws ColmapStopped
+    std::filesystem::path pairs = {};           // a list of pairs of photos: match these alone
+    // Photos that are known pinholes: squares of this many px that see 90 degrees. Their cameras
+    // are taken as they are, and nothing is undistorted. 0: lenses are found, too.
+    int pinhole = 0;
+    double enough = kEnoughPhotos;            // of the photos, before it tries harder
+    const std::atomic<bool>* stop = nullptr;  // when set: ends COLMAP, throws ColmapStopped
 };
 
 /// What a run reports while it works; any function may be empty.
@@ -109,13 +116,12 @@ std::vector<ColmapCommand> colmap_commands(const ColmapRun& run, const ColmapPat
 
 /// Runs the commands. Where less than a share kEnoughPhotos of the photos get a camera, it tries
 /// again with the next effort, and keeps the model that holds the most photos. Returns the data
-/// set's folder (workspace/dense, with images and sparse); the model is workspace/sparse, and
+/// set's folder (workspace/dense, with images and sparse), or with run.pinhole the model's; the
+/// model is workspace/sparse, and
 /// everything that COLMAP printed is in workspace/colmap.log. What an interrupted run left is used
 /// again where the options are equal. Throws Error with the commands in its hint where COLMAP is
 /// not installed, or with the last printed lines where a command fails; and ColmapStopped.
 std::filesystem::path run_colmap(const ColmapRun& run, const ColmapReports& reports);
-
-constexpr double kEnoughPhotos = 0.8;  // share of the photos
 
 /// The effort that made workspace/sparse; usual where it is not known.
 ColmapEffort effort_of_colmap(const std::filesystem::path& workspace);

@@ -30,6 +30,7 @@ constexpr OfCommand kOfCommand[] = {
     {"frames", "Videos go through `darb train` first."},
     {"resume", "Give start_checkpoint=path."},
     {"sequential", "Photos without cameras go through `darb train` first."},
+    {"panoramas", "Photos without cameras go through `darb train` first."},
     {"report", "The command writes reports."},
     {"end_without_gain", "Call evaluate() and stop when it gains no more."},
     {"test_iterations", "Call evaluate() when you want it."},

@@ -15,6 +15,7 @@
 #include "engine/data/colmap.h"
 #include "engine/data/dataset.h"
 #include "engine/data/image_io.h"
+#include "engine/data/panorama_files.h"
 #include "engine/data/run_colmap.h"
 
 namespace darb {
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kMinPhotos = 3;
-constexpr std::size_t kHeadBytes = 1 << 16;  // EXIF is the first segment of a JPEG
+constexpr std::size_t kHeadBytes = 1 << 18;  // EXIF and XMP are the first segments of a JPEG
 
 struct Pictures {
     std::vector<fs::directory_entry> photos;
@@ -133,7 +134,10 @@ PhotoList list_photos(const fs::path& folder) {
         const ImageInfo info = read_image_info(entry.path());
         sizes.insert({info.width, info.height});
         list.names.push_back(fs::relative(entry.path(), folder).generic_string());
-        times.push_back(exif_time(read_file_head(entry.path(), kHeadBytes)));
+        const std::vector<std::byte> head = read_file_head(entry.path(), kHeadBytes);
+        times.push_back(exif_time(head));
+        list.marked_panoramas += is_marked_panorama(head) ? 1 : 0;
+        list.twice_as_wide += info.width == 2 * info.height ? 1 : 0;
         lines.push_back(fmt::format("{} bytes {}\n", entry.file_size(), list.names.back()));
     }
     if (lines.size() < kMinPhotos)

@@ -23,6 +23,8 @@ struct PhotoList {
     std::vector<std::string> names;  // paths below the folder, in order
     bool one_size = true;
     PhotoOrder order = PhotoOrder::none;
+    std::size_t marked_panoramas = 0;  // photos that say that they are equirectangular
+    std::size_t twice_as_wide = 0;     // photos that are exactly twice as wide as high
     std::string left_out;  // pictures in formats that are not read, with a remedy; may be empty
 };
 

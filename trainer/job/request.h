@@ -23,8 +23,10 @@ struct TrainRequest {
     // What the run trains on.
     std::string dataset;  // a folder, a .json file or a video, as load_training_data() takes it
     DatasetOptions data{.original_where_wide = true};
-    bool sequential = false;  // photos without cameras: match neighbours in name order only
-    int frames = 0;           // pictures of a video; 0: by its length
+    bool sequential = false;         // photos without cameras: match neighbours in name order only
+    std::string panoramas = "auto";  // photos without cameras show all directions: on, off, or
+                                     // auto, by what the files say
+    int frames = 0;                  // pictures of a video; 0: by its length
 
     // What it trains. Kernel, footprint, accuracy and strategy are members of `train`.
     TrainOptions train;

@@ -204,6 +204,16 @@ void photo_rows(Rows& rows) {
          .section = "data",
          .key = "sequential",
          .place = [](Request& r) -> RequestPlace { return &r.sequential; }});
+    rows.push_back({.row = {.flags = "--panoramas",
+                            .group = option_group::kPhotos,
+                            .help = "photos or a video without cameras: whether they show all "
+                                    "directions (equirectangular), of a 360-degree camera; auto: "
+                                    "as the files say",
+                            .usual = "auto"},
+                    .words = "auto,on,off",
+                    .section = "data",
+                    .key = "panoramas",
+                    .place = [](Request& r) -> RequestPlace { return &r.panoramas; }});
     rows.push_back(
         {.row = {.flags = "--frames",
                  .group = option_group::kPhotos,

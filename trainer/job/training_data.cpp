@@ -19,6 +19,8 @@
 #include "engine/core/text.h"
 #include "engine/data/colmap.h"
 #include "engine/data/masks.h"
+#include "engine/data/panorama_cameras.h"
+#include "engine/data/panorama_files.h"
 #include "engine/data/run_colmap.h"
 #include "engine/data/video.h"
 #include "trainer/job/photo_folder.h"
@@ -145,12 +147,16 @@ class ColmapScreen {
     double told_ = 0;  // seconds of the step
 };
 
+std::string choose_few_features(ColmapRun& run) {
+    run.effort = ColmapEffort::quick;
+    return "--preset preview: COLMAP is asked for 2,048 features a photo in place of 8,192.";
+}
+
 // Neighbours where photos follow each other and are many; a sentence for people.
 std::string choose_quick(const PhotoList& list, ColmapRun& run) {
-    run.effort = ColmapEffort::quick;
-    const std::string fewer =
-        "--preset preview: COLMAP is asked for 2,048 features a photo in place of 8,192";
-    if (run.sequential) return fewer + ".";
+    std::string fewer = choose_few_features(run);
+    if (run.sequential) return fewer;
+    fewer.pop_back();
     const std::size_t pairs = run.count * (run.count - 1) / 2;
     if (run.count <= kFewPhotos)
         return fmt::format("{}, and compares all {} pairs, as {} photos are few.", fewer, pairs,
@@ -171,10 +177,8 @@ std::string choose_quick(const PhotoList& list, ColmapRun& run) {
 }
 
 // Those of the list that the model lacks.
-std::string missing_photos(const PhotoList& list, const Dataset& dataset) {
+std::string missing_photos(const PhotoList& list, const std::set<std::string>& found) {
     constexpr std::size_t kNamed = 12;
-    std::set<std::string> found;
-    for (const View& view : dataset.views) found.insert(view.name);
     std::string names;
     std::size_t missing = 0;
     for (const std::string& name : list.names)
@@ -184,12 +188,33 @@ std::string missing_photos(const PhotoList& list, const Dataset& dataset) {
     return fmt::format(" Not found were those of {}{}.", names, missing > kNamed ? ", ..." : "");
 }
 
+// Whether the photos are panoramas. `notes` gets a doubt.
+bool are_panoramas(const PhotoList& list, const TrainRequest& request, const fs::path& photos,
+                   std::vector<std::string>& notes) {
+    if (request.panoramas != "auto") return request.panoramas == "on";
+    const bool video = is_video_name(request.dataset) && !fs::is_directory(request.dataset);
+    const std::size_t count = list.names.size();
+    if (video && is_marked_panorama_video(request.dataset)) return true;
+    if (list.marked_panoramas == count) return true;
+    if (list.marked_panoramas > 0)
+        throw Error(photos.string(),
+                    fmt::format("{} of {} photos are panoramas, and COLMAP takes either kind alone",
+                                list.marked_panoramas, count),
+                    "Put them into two folders, or say --panoramas on or off.");
+    if (list.twice_as_wide == count)
+        notes.push_back(
+            "Warning: the photos are twice as wide as high. If they show all directions, as those "
+            "of a 360-degree camera do, remove the output folder and use --panoramas on.");
+    return false;
+}
+
 // The first line is what dense was made with, the others are what the cameras were.
 struct MadeFrom {
     std::string size, photos;
-    static MadeFrom of(const ColmapRun& run, const PhotoList& list) {
+    static MadeFrom of(const ColmapRun& run, const PhotoList& list, bool panoramas) {
         MadeFrom made{size_line(run.max_image_size), list.text};
         if (!run.masks.empty()) made.photos += "masks " + run.masks.string() + "\n";
+        if (panoramas) made.photos += "panoramas\n";
         return made;
     }
     static MadeFrom read(const fs::path& file) {
@@ -201,10 +226,10 @@ struct MadeFrom {
 };
 
 // Finds cameras, or takes those that are there; seconds: that it took.
-fs::path make_dense(ColmapRun& run, const PhotoList& list, const TrainRequest& request,
-                    const DataSinks& sinks, double& seconds) {
+fs::path make_dense(ColmapRun& run, const PhotoList& list, bool panoramas,
+                    const TrainRequest& request, const DataSinks& sinks, double& seconds) {
     const fs::path list_file = run.workspace / "photos.txt", dense = run.workspace / "dense";
-    const MadeFrom made = MadeFrom::of(run, list);
+    const MadeFrom made = MadeFrom::of(run, list, panoramas);
     if (fs::exists(list_file)) {
         const MadeFrom there = MadeFrom::read(list_file);
         if (there.photos != made.photos)
@@ -220,8 +245,9 @@ fs::path make_dense(ColmapRun& run, const PhotoList& list, const TrainRequest& r
     reports.progress = [&](std::size_t step, const ColmapOutput& output, double spent,
                            double left) { screen.progress(step, output, spent, left); };
     if (is_installed("colmap") && largest_colmap_model(run.workspace / "sparse").empty()) {
-        const std::string choice =
-            request.preset == kRunPresets.front().name ? choose_quick(list, run) : "";
+        const std::string choice = request.preset != kRunPresets.front().name ? ""
+                                   : panoramas ? choose_few_features(run)
+                                               : choose_quick(list, run);
         if (!choice.empty()) screen.note(choice);
         screen.note(
             fmt::format("COLMAP looks for the cameras of {} photos first. The forecast of "
@@ -231,7 +257,13 @@ fs::path make_dense(ColmapRun& run, const PhotoList& list, const TrainRequest& r
     run.stop = sinks.stop;
     const auto start = std::chrono::steady_clock::now();
     try {
-        run_colmap(run, reports);
+        if (panoramas) {
+            constexpr std::size_t kFewPanoramas = 12;
+            run.sequential |= run.count > kFewPanoramas && list.order != PhotoOrder::none;
+            find_panorama_cameras(run, list.names, reports);
+        } else {
+            run_colmap(run, reports);
+        }
     } catch (const ColmapStopped&) {
         screen.note(fmt::format("COLMAP was stopped. The same command goes on from what is in {}.",
                                 run.workspace.string()));
@@ -255,14 +287,20 @@ Dataset load_through_colmap(const fs::path& photos, const TrainRequest& request,
     run.single_camera = list.one_size;
     run.count = list.names.size();
     double seconds = 0;
-    const fs::path dense = make_dense(run, list, request, sinks, seconds);
-    const std::size_t masks = run.masks.empty() ? 0 : straighten_masks(run);
+    std::vector<std::string> doubts;
+    const bool panoramas = are_panoramas(list, request, photos, doubts);
+    const fs::path dense = make_dense(run, list, panoramas, request, sinks, seconds);
+    const std::size_t masks = run.masks.empty() || panoramas ? 0 : straighten_masks(run);
     DatasetOptions options = request.data;
     options.images_folder = "images";
     Dataset dataset = load_dataset(dense, options);
+    std::set<std::string> placed;
+    for (const View& view : dataset.views)
+        placed.insert(fs::relative(view.photo, dense / "images").generic_string());
     std::string found =
-        fmt::format("COLMAP found the cameras of {} of {} photos; {} is the data set with them.{}",
-                    dataset.views.size(), run.count, dense.string(), missing_photos(list, dataset));
+        fmt::format("COLMAP found the cameras of {} of {} {}; {} is the data set with them.{}",
+                    placed.size(), run.count, panoramas ? "panoramas" : "photos", dense.string(),
+                    missing_photos(list, placed));
     const bool preview = request.preset == kRunPresets.front().name;
     if (effort_of_colmap(run.workspace) == ColmapEffort::quick && !preview)
         found += fmt::format(
@@ -275,6 +313,7 @@ Dataset load_through_colmap(const fs::path& photos, const TrainRequest& request,
             "this output folder use them again.",
             format_duration(seconds));
     dataset.notes.insert(dataset.notes.begin(), std::move(found));
+    dataset.notes.insert(dataset.notes.end(), doubts.begin(), doubts.end());
     if (!list.left_out.empty()) dataset.notes.push_back(list.left_out);
     if (masks > 0)
         dataset.notes.push_back(

@@ -190,5 +190,33 @@ TEST(PanoramaFiles, ffprobe_reads_the_mark_of_a_video) {
     EXPECT_THROW(mark_panorama_video(folder / "no.mp4"), Error);
 }
 
+TEST(PanoramaFiles, photos_and_videos_say_that_they_are_panoramas) {
+    const auto folder = test_folder();
+    EXPECT_TRUE(is_marked_panorama(encode_panorama_png(six_colours())));
+    EXPECT_FALSE(is_marked_panorama(encode_png(six_colours())));
+    const auto marked = [&](std::string_view xmp) {
+        return is_marked_panorama(std::as_bytes(std::span(xmp)));
+    };
+    EXPECT_TRUE(marked("<GPano:ProjectionType>equirectangular</GPano:ProjectionType>"));
+    EXPECT_FALSE(marked("<GPano:ProjectionType>cylindrical</GPano:ProjectionType>"));
+    const auto video = [&](const std::string& index) {
+        std::string file(
+            "\0\0\0\x10"
+            "ftypisom\0\0\0\0\0\0\0\x0c"
+            "mdatabcd",
+            28);
+        const auto size = static_cast<char>(8 + index.size());
+        write_file_atomic(folder / "v.mp4",
+                          file + std::string("\0\0\0", 3) + size + "moov" + index);
+        return is_marked_panorama_video(folder / "v.mp4");
+    };
+    EXPECT_TRUE(video("uuid <GSpherical:ProjectionType>equirectangular<"));
+    EXPECT_TRUE(video("trak sv3d prhd equi"));
+    EXPECT_FALSE(video("trak equi"));
+    EXPECT_FALSE(is_marked_panorama_video(folder / "missing.mp4"));
+    write_file_atomic(folder / "v.mp4", std::string("no video at all, and long enough"));
+    EXPECT_FALSE(is_marked_panorama_video(folder / "v.mp4"));
+}
+
 }  // namespace
 }  // namespace darb

@@ -11,6 +11,8 @@
 #include <thread>
 #include <utility>
 
+#include "engine/scene/panorama.h"
+
 namespace darb::make_scene {
 
 namespace {
@@ -31,24 +33,33 @@ std::uint8_t to_byte(double linear) {
         std::lround(255 * std::pow(std::clamp(soft, 0.0, 1.0), 1 / 2.2)));
 }
 
-dvec3 pixel_colour(const World& world, const Camera& camera, int x, int y, int samples,
-                   Pcg32& rng) {
+Ray panorama_ray(const Camera& camera, double x, double y) {
+    const dvec3 local = panorama_direction({x, y}, camera.width, camera.height);
+    return {camera.centre(), glm::transpose(camera.rotation) * local};
+}
+
+using PixelRay = Ray (*)(const Camera&, double x, double y);
+
+dvec3 pixel_colour(const World& world, const Camera& camera, PixelRay ray, int x, int y,
+                   int samples, Pcg32& rng) {
     dvec3 sum(0.0);
     for (int i = 0; i < samples; ++i) {  // R2 sequence over the pixel
         const double u = 0.7548776662466927 * (i + 1), v = 0.5698402909980532 * (i + 1);
-        const Ray ray = ray_through(camera, x + u - std::floor(u), y + v - std::floor(v));
-        sum += glm::min(radiance(world, ray, rng), dvec3(4.0));
+        const Ray through = ray(camera, x + u - std::floor(u), y + v - std::floor(v));
+        sum += glm::min(radiance(world, through, rng), dvec3(4.0));
     }
     return sum / static_cast<double>(samples);
 }
 
-ImageU8 take_photo(const World& world, const Camera& camera, std::uint64_t seed, int samples) {
+ImageU8 take_photo(const World& world, const View& view, std::uint64_t seed, int samples) {
+    const Camera& camera = view.camera;
+    const PixelRay ray = view.lens.panorama() ? panorama_ray : ray_through;
     if (samples == 0) samples = std::max(kSamples * kWidth / camera.width, 16);
     ImageU8 photo(camera.width, camera.height, 3);
     for (int y = 0; y < camera.height; ++y) {
         Pcg32 rng(seed, static_cast<std::uint64_t>(y));
         for (int x = 0; x < camera.width; ++x) {
-            const dvec3 colour = pixel_colour(world, camera, x, y, samples, rng);
+            const dvec3 colour = pixel_colour(world, camera, ray, x, y, samples, rng);
             for (int c = 0; c < 3; ++c) photo.at(x, y, c) = to_byte(colour[c]);
         }
     }
@@ -166,7 +177,7 @@ std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& vi
     std::atomic<std::size_t> next{0};
     const auto work = [&] {
         for (std::size_t i = next++; i < views.size(); i = next++)
-            photos[i] = take_photo(world, views[i].camera, seed + i, samples);
+            photos[i] = take_photo(world, views[i], seed + i, samples);
     };
     std::vector<JoinedThread> threads;
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)

@@ -47,7 +47,8 @@ std::vector<View> camera_path(int scale = 1, const Heights& heights = {});
 /// higher_N, lower_N (6 degrees), outside_N and between_N (between its turns), kOffPath in all.
 std::vector<View> off_path_views(int scale = 1, const Heights& heights = {});
 
-/// Takes their pictures (gamma 2.2, 8 bits). Uses all cores; the result does not depend on their
+/// Takes their pictures (gamma 2.2, 8 bits); of a view whose lens is a panorama, one of all
+/// directions. Uses all cores; the result does not depend on their
 /// number.
 std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& views,
                                  std::uint64_t seed, int samples = 0);

@@ -6,6 +6,8 @@
 // make_scene outdoors FOLDER [SCALE]: photos from near the ground, under clouds.
 // make_scene town FOLDER SIDE SCALE: SIDE x SIDE photos of a town of 16 blocks (town.h).
 // make_scene town-depths FOLDER SIDE SCALE: also writes the true depths of its photos.
+// make_scene panoramas FOLDER COUNT WIDTH: panoramas of a walk through the town, without cameras,
+// and their true poses in truth.json.
 // make_scene surface FOLDER: what is true of the still life's surface, without photos: surface.ply,
 // points that two training photos see, and shapes.json, its shapes (surface.h).
 // make_scene town-surface FOLDER SIDE: the same of the town, by SIDE x SIDE photos.
@@ -29,6 +31,12 @@ void make_town(const std::filesystem::path& folder, int side, double scale, bool
     const CaptureSettings settings = town_capture(views.size());
     write_scene(folder, views, capture_views(world, views, settings));
     if (depths) write_depths(folder, views, take_depths(world, views, settings.reach));
+}
+
+void make_panoramas(const std::filesystem::path& folder, int count, int width) {
+    using namespace darb::make_scene;
+    const std::vector<darb::View> views = town_walk(count, width);
+    write_panoramas(folder, views, take_photos(town(), views, 0, 4));
 }
 
 void make_still_life(const std::filesystem::path& folder, int scale, bool outdoors, bool depths) {
@@ -68,6 +76,9 @@ int usage() {
         "       make_scene outdoors FOLDER [SCALE]   (from near the ground, under clouds)\n"
         "       make_scene town FOLDER SIDE SCALE   (SIDE x SIDE photos; SCALE from 0.2)\n"
         "       make_scene town-depths FOLDER SIDE SCALE   (with the true depths of the photos)\n"
+        "       make_scene panoramas FOLDER COUNT WIDTH   (a walk through the town; 3 or more, 64 "
+        "px "
+        "or more)\n"
         "       make_scene surface FOLDER   (true surfaces of the still life, no photos)\n"
         "       make_scene town-surface FOLDER SIDE   (those of the town)\n");
     return 2;
@@ -88,6 +99,12 @@ int main(int argc, char** argv) {
     if (photos_of_town)
         return make(
             [&] { make_town(argv[2], side, town_scale, std::strcmp(argv[1], "town") != 0); });
+    if (asks_for("panoramas", 5)) {
+        const int count = std::atoi(argv[3]), width = std::atoi(argv[4]);
+        if (count < 3 || count > 1000 || width < 64 || width > 8192 || width % 2 != 0)
+            return usage();
+        return make([&] { make_panoramas(argv[2], count, width); });
+    }
     if (asks_for("town-surface", 4))
         return make([&] { write_surface(argv[2], town(), town_flight(side, 1), kTownSurface); });
     if (asks_for("surface", 3))

@@ -117,6 +117,30 @@ std::vector<View> town_flight(int side, double scale) {
     return views;
 }
 
+std::vector<View> town_walk(int count, int width) {
+    constexpr double kStreetLength = 6, kEyes = 0.55, kSway = 0.15;
+    std::vector<View> views;
+    for (int i = 0; i < count; ++i) {
+        const double way = 2 * kStreetLength * i / (count - 1);
+        const bool first = way < kStreetLength;
+        const double sway = kSway * std::sin(1.7 * i);
+        const dvec3 eye = first ? dvec3(sway, way - kStreetLength, kEyes + 0.4 * sway)
+                                : dvec3(way - kStreetLength, sway, kEyes + 0.4 * sway);
+        // As a walker turns it: along the street, a little to and fro, and never quite level.
+        const double heading = (first ? 90.0 : 0.0) + 14 * std::sin(0.9 * i);
+        const double angle = glm::radians(heading);
+        const dvec3 ahead(std::cos(angle), std::sin(angle), 0.06 * std::sin(2.3 * i));
+        View view;
+        view.name = fmt::format("panorama_{:03d}.png", i);
+        view.camera = look_at(eye, eye + ahead, 1);
+        view.camera.width = width;
+        view.camera.height = width / 2;
+        view.lens = {"EQUIRECTANGULAR", {double(width), double(width / 2)}, width, width / 2};
+        views.push_back(view);
+    }
+    return views;
+}
+
 CaptureSettings town_capture(std::size_t views) {
     return {.points = kTownPointsAPhoto * static_cast<int>(views), .reach = 1e6, .samples = 6};
 }

@@ -22,6 +22,10 @@ World town();
 /// multiplies the sides of the photos, 200 x 150 px.
 std::vector<View> town_flight(int side, double scale);
 
+/// Panoramas of a walk along two streets, and around the corner between them, at the height of a
+/// head. width: of a panorama, px.
+std::vector<View> town_walk(int count, int width);
+
 /// How photos and points of the town are captured.
 CaptureSettings town_capture(std::size_t views);
 

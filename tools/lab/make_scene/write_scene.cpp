@@ -9,6 +9,7 @@
 #include "engine/data/colmap.h"
 #include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
+#include "engine/data/panorama_files.h"
 
 namespace darb::make_scene {
 
@@ -27,6 +28,7 @@ nlohmann::json pose_json(const Camera& camera) {
 
 std::string transforms_json(const std::vector<View>& views, bool test) {
     const Camera& camera = views.front().camera;
+    const bool panoramas = views.front().lens.panorama();
     nlohmann::ordered_json file = {{"w", camera.width},
                                    {"h", camera.height},
                                    {"fl_x", camera.fx},
@@ -34,6 +36,11 @@ std::string transforms_json(const std::vector<View>& views, bool test) {
                                    {"cx", camera.cx},
                                    {"cy", camera.cy},
                                    {"frames", nlohmann::ordered_json::array()}};
+    if (panoramas)
+        file = {{"camera_model", views.front().lens.model},
+                {"w", camera.width},
+                {"h", camera.height},
+                {"frames", nlohmann::ordered_json::array()}};
     for (const View& view : views) {
         if (view.is_test != test) continue;
         file["frames"].push_back(
@@ -67,6 +74,14 @@ void write_scene(const std::filesystem::path& folder, const std::vector<View>& v
     write_file_atomic(folder / "test.txt", held_out);
     write_file_atomic(folder / "transforms_train.json", transforms_json(views, false));
     write_file_atomic(folder / "transforms_test.json", transforms_json(views, true));
+}
+
+void write_panoramas(const std::filesystem::path& folder, const std::vector<View>& views,
+                     const std::vector<ImageU8>& photos) {
+    refuse_other_photos(folder / "images", views);
+    for (std::size_t i = 0; i < views.size(); ++i)
+        write_panorama_png(folder / "images" / views[i].name, photos[i]);
+    write_file_atomic(folder / "truth.json", transforms_json(views, false));
 }
 
 void write_depths(const std::filesystem::path& folder, const std::vector<View>& views,

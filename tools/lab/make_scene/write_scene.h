@@ -19,6 +19,11 @@ void write_scene(const std::filesystem::path& folder, const std::vector<View>& v
 void write_test_views(const std::filesystem::path& folder, const std::vector<View>& views,
                       const std::vector<ImageU8>& photos);
 
+/// Writes FOLDER/images/NAME and truth.json, a transforms.json with their true poses: a folder of
+/// panoramas without cameras, for whoever finds them. Throws Error.
+void write_panoramas(const std::filesystem::path& folder, const std::vector<View>& views,
+                     const std::vector<ImageU8>& photos);
+
 /// Writes FOLDER/depths: a 16-bit PNG per view, in millimetres.
 void write_depths(const std::filesystem::path& folder, const std::vector<View>& views,
                   const std::vector<ImageF>& depths);
