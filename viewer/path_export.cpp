@@ -180,14 +180,20 @@ PathExport::~PathExport() {
     folder_.drop_unfinished_video();
 }
 
+ImageU8 PathExport::frame(const Render& render) const {
+    return blurred(options_.blur, [&](int i) {
+        Navigation view;
+        apply(path_.sample(double(next_) / options_.fps + shutter_time(options_.blur, i)), view);
+        const Camera camera = view.camera(options_.width, options_.height);
+        return render(through_lens(camera, options_.blur, i), options_.display);
+    });
+}
+
 void PathExport::step(const Render& render, bool wait) {
     if (done_) return;
     if (!has_frames()) {
-        Navigation view;
-        apply(path_.sample(double(next_) / options_.fps), view);
         const auto write = options_.panorama ? write_panorama_png : write_png;
-        write(folder_.claim(frame_name(next_)),
-              render(view.camera(options_.width, options_.height), options_.display));
+        write(folder_.claim(frame_name(next_)), frame(render));
         ++next_;
     } else if (!ffmpeg_) {
         folder_.finish(frames_);

@@ -12,6 +12,7 @@
 
 #include "engine/core/image.h"
 #include "engine/core/process.h"
+#include "engine/render/camera_blur.h"
 #include "viewer/camera_path.h"
 #include "viewer/display.h"
 
@@ -61,7 +62,8 @@ struct ExportOptions {
     int fps = 30;               // frames a second, 1 at least
     int width = 0, height = 0;  // px of every frame
     bool panorama = false;      // frames show all directions: the files say so
-    DisplaySettings display;    // for every frame; without a photo there is no error to show
+    DisplaySettings display{};  // for every frame; without a photo there is no error to show
+    CameraBlur blur{};          // of every frame; off: all is sharp
 };
 
 class PathExport {
@@ -89,6 +91,7 @@ class PathExport {
     const std::string& summary() const { return summary_; }
 
   private:
+    ImageU8 frame(const Render& render) const;
     void start_video();
     void watch_video(bool wait);
     CameraPath path_;

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <span>
@@ -19,6 +20,7 @@
 
 #include "engine/check/dump.h"
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/core/quantile.h"
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
@@ -28,6 +30,8 @@
 #include "engine/gpu/device.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/raster/frame_view.h"
+#include "engine/render/camera_blur.h"
+#include "engine/render/orthophoto.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/panorama.h"
 #include "engine/scene/stored_units.h"
@@ -53,7 +57,18 @@ struct FilmFlags {
 };
 
 constexpr const char *kPerspective = "perspective", *kEquirectangular = "equirectangular",
-                     *kCubemap = "cubemap";
+                     *kCubemap = "cubemap", *kOrthographic = "orthographic";
+
+struct BlurFlags {
+    double aperture = 0, shutter = 0;  // world units; degrees of a turn of a film's shutter
+    std::optional<double> focus;       // world units; absent: what is in the middle
+    int samples = 32;
+};
+
+struct OrthophotoFlags {
+    std::string from = "above";
+    double pixel = 0;  // world units; 0: as --size says
+};
 
 struct RenderFlags {
     std::filesystem::path scene, cameras, output;
@@ -62,6 +77,8 @@ struct RenderFlags {
     std::optional<float> near_plane;  // world units
     std::string effects = "auto", projection = kPerspective;
     FilmFlags film;
+    BlurFlags blur;
+    OrthophotoFlags orthophoto;
     DepthFlags depth;
     DatasetOptions data;
     KernelFlags kernel;
@@ -72,7 +89,11 @@ struct RenderFlags {
 
 /// cameras: the option that excludes these.
 void add_film_flags(CLI::App& command, FilmFlags& flags, CLI::Option* cameras);
-/// Returns the exit code. Throws Error.
+void add_blur_flags(CLI::App& command, BlurFlags& flags);
+void add_orthophoto_flags(CLI::App& command, OrthophotoFlags& flags);
+/// Return the exit code. Throw Error.
+int render_orthophoto(const RenderFlags& flags, const Accuracy& accuracy,
+                      const EffectChoice& choice);
 int render_film(const RenderFlags& flags, const Accuracy& accuracy, const EffectChoice& choice);
 
 namespace {
@@ -85,7 +106,7 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 constexpr const char *kPanoramaSize = "2048x1024", *kFaceSize = "1024x1024";
 
 bool shows_all_around(const RenderFlags& flags) {
-    return flags.projection != kPerspective;
+    return flags.projection == kEquirectangular || flags.projection == kCubemap;
 }
 
 // Of a panorama, or of a face of a cube map.
@@ -107,8 +128,16 @@ void check_projection(const RenderFlags& flags) {
     if (!around && !flags.cameras.empty() && !flags.film.size.empty())
         throw Error("--size", "the cameras have sizes of their own",
                     "Use -r, or leave --cameras out.");
-    if (!around) return;
     const std::string what = "--projection " + flags.projection;
+    if (flags.projection == kOrthographic && !(flags.cameras.empty() && flags.film.path.empty()))
+        throw Error(what, "is one picture of the whole scene", "Leave --cameras and --path out.");
+    if (flags.projection != kOrthographic &&
+        (flags.orthophoto.pixel > 0 || flags.orthophoto.from != "above"))
+        throw Error("--from, --pixel", "are of a picture without perspective",
+                    "Add --projection orthographic.");
+    if (flags.projection == kOrthographic && !flags.depth.format.empty())
+        throw Error(what, "has no depth beside it", "Leave --depth out.");
+    if (!around) return;
     if (flags.projection == kCubemap && flags.cameras.empty())
         throw Error(what, "is for single pictures", "Name --cameras, or take equirectangular.");
     if (!flags.depth.format.empty())
@@ -118,6 +147,37 @@ void check_projection(const RenderFlags& flags) {
                     "Use --size in place of -r.");
     if (flags.data.original_lens) throw Error(what, "knows no lens", "Leave --lens out.");
     size_around(flags);
+}
+
+// What the lens and the shutter blur in a picture of this camera.
+CameraBlur blur_of(const RenderFlags& flags, const SplatModel& model, const Camera& camera,
+                   const std::string& where) {
+    CameraBlur blur{.aperture = flags.blur.aperture, .samples = flags.blur.samples};
+    if (!(blur.aperture > 0)) return blur;
+    if (camera.lens.active)
+        throw Error(where, "its lens is kept, and --aperture bends straight pictures only",
+                    "Leave --lens out.");
+    const std::optional<double> focus =
+        flags.blur.focus ? flags.blur.focus : seen_depth(model, camera);
+    if (!focus)
+        throw Error(where, "there is nothing in the middle to focus on",
+                    "Give --focus a distance.");
+    blur.focus = *focus;
+    return blur;
+}
+
+void check_blur(const RenderFlags& flags) {
+    const bool film = flags.cameras.empty();
+    if (flags.blur.shutter > 0 && !film)
+        throw Error("--shutter", "blurs what moves, and single pictures of --cameras stand still",
+                    "Use it with --path or a turn.");
+    if (!(flags.blur.aperture > 0) && flags.blur.focus)
+        throw Error("--focus", "changes nothing, as everything is sharp", "Add --aperture.");
+    if (flags.blur.aperture > 0 && !flags.depth.format.empty())
+        throw Error("--depth", "would be that of one point of the lens", "Leave --aperture out.");
+    if ((flags.blur.aperture > 0 || flags.blur.shutter > 0) && flags.projection != kPerspective)
+        throw Error("--projection " + flags.projection, "is of a camera without lens and shutter",
+                    "Leave --aperture and --shutter out.");
 }
 
 /// Draws what a camera's place sees in all directions; how the camera is turned decides what is in
@@ -218,11 +278,25 @@ std::vector<std::filesystem::path> files_of_views(const std::vector<View>& views
     return files;
 }
 
+// The pinholes that are drawn, for the effects to be planned by.
+std::vector<View> views_to_plan(const std::vector<View>& views, const RenderFlags& flags,
+                                const SplatModel& model) {
+    if (shows_all_around(flags)) return faces_of(views, flags);
+    std::vector<View> drawn = views;
+    if (flags.blur.aperture > 0)
+        for (View& view : drawn)
+            view.camera =
+                through_lens(view.camera, blur_of(flags, model, view.camera, view.name), 0);
+    return drawn;
+}
+
 int render(RenderFlags flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     const EffectChoice choice = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     check_depth(flags.depth, accuracy, choice);
     check_projection(flags);
+    check_blur(flags);
+    if (flags.projection == kOrthographic) return render_orthophoto(flags, accuracy, choice);
     flags.data.whole_panoramas = shows_all_around(flags);
     if (flags.cameras.empty()) return render_film(flags, accuracy, choice);
     SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, nullptr, flags.units));
@@ -240,7 +314,7 @@ int render(RenderFlags flags) {
     settle_tuning(device, flags.tune);
     const float near_plane = flags.near_plane.value_or(static_cast<float>(NEAR_DEFAULT));
     EffectPlan plan =
-        plan_rendering(model, shows_all_around(flags) ? faces_of(views, flags) : views,
+        plan_rendering(model, views_to_plan(views, flags, model),
                        {.depth = !flags.depth.format.empty(), .near_plane = near_plane}, choice);
     apply_plan(plan, model);
     apply_plan(plan, views);
@@ -261,11 +335,17 @@ int render(RenderFlags flags) {
             frame_ms.push_back(milliseconds_since(start));
             continue;
         }
-        const ImageF image = renderer.render(view.camera, background, -1, near_plane);
+        const CameraBlur blur = blur_of(flags, model, view.camera, view.name);
+        const auto draw = [&](const Camera& camera) {
+            const ImageF image = renderer.render(camera, background, -1, near_plane);
+            plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
+            return to_8bit(image);
+        };
+        const ImageU8 picture =
+            blurred(blur, [&](int i) { return draw(through_lens(view.camera, blur, i)); });
         frame_ms.push_back(milliseconds_since(start));
-        plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
         const auto& file = files[frame_ms.size() - 1];
-        write_png(file, to_8bit(image));
+        write_png(file, picture);
         if (plan.on(EFFECT_DEPTH)) depths.write(file, renderer.render_depth(reading));
     }
     written.wrote(outputs);
@@ -294,14 +374,17 @@ void add_render(CLI::App& app, Action& action) {
         ->add_option("--projection", flags->projection,
                      "perspective: what the camera sees; equirectangular: all directions, as 360 "
                      "viewers and players show them, 2048x1024 px without --size; cubemap: six "
-                     "pictures of 90 degrees, NAME_front and so on, 1024x1024 px")
-        ->check(CLI::IsMember({kPerspective, kEquirectangular, kCubemap}))
+                     "pictures of 90 degrees, NAME_front and so on, 1024x1024 px; orthographic: an "
+                     "orthophoto of the scene without perspective")
+        ->check(CLI::IsMember({kPerspective, kEquirectangular, kCubemap, kOrthographic}))
         ->capture_default_str();
     add_film_flags(*command, flags->film, cameras);
+    add_blur_flags(*command, flags->blur);
+    add_orthophoto_flags(*command, flags->orthophoto);
     command->add_option("-o,--output", flags->output, "folder of the frames; it is made if missing")
         ->required();
-    command->add_flag("--force", flags->force, "replace pictures that darb did not write")
-        ->needs(cameras);
+    command->add_flag("--force", flags->force,
+                      "replace pictures of cameras, or an orthophoto, that darb did not write");
     command->add_option("-r,--resolution", flags->data.resolution,
                         "1, 2, 4, 8: divide the cameras' size; above 8: width in px; default: as "
                         "they are, those of a data set at most 1,600 px wide");
@@ -455,6 +538,13 @@ std::vector<Camera> cameras_of_turn(const RenderFlags& flags) {
     }
 }
 
+glm::dvec3 up_of_scene(const RenderFlags& flags, const SplatModel& model,
+                       const std::vector<Camera>& cameras, const std::string& stated_up) {
+    if (!flags.film.up.empty()) return up_from_name(flags.film.up);
+    if (const std::optional<glm::dvec3> held = up_of_cameras(cameras)) return *held;
+    return stated_up.empty() ? guess_up(model) : up_from_name(stated_up);
+}
+
 CameraPath turn_around(const RenderFlags& render, const PixelSize& size, const SplatModel& model,
                        const std::string& stated_up) {
     const FilmFlags& flags = render.film;
@@ -464,15 +554,39 @@ CameraPath turn_around(const RenderFlags& render, const PixelSize& size, const S
     options.width = size.width;
     options.height = size.height;
     options.cameras = cameras_of_turn(render);
-    const std::optional<glm::dvec3> held = up_of_cameras(options.cameras);
-    options.up = !flags.up.empty()    ? up_from_name(flags.up)
-                 : held               ? *held
-                 : !stated_up.empty() ? up_from_name(stated_up)
-                                      : guess_up(model);
+    options.up = up_of_scene(render, model, options.cameras, stated_up);
     return turntable(model, options);
 }
 
 }  // namespace
+
+void add_blur_flags(CLI::App& c, BlurFlags& flags) {
+    c.add_option("--aperture", flags.aperture,
+                 "depth of field: the radius of the lens, world units; 0: everything is sharp")
+        ->capture_default_str()
+        ->check(zero_or_more());
+    c.add_option("--focus", flags.focus, "the distance that is sharp, world units")
+        ->default_str("that of what is in the middle; in a film, of its first frame")
+        ->check(above_zero());
+    c.add_option("--shutter", flags.shutter,
+                 "motion blur of a film: the shutter is open for DEGREES/360 of a frame's time; "
+                 "180 is usual")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 360.0));
+    c.add_option("--samples", flags.samples, "pictures that a blurred one is the mean of")
+        ->capture_default_str()
+        ->check(CLI::Range(2, 4096));
+}
+
+void add_orthophoto_flags(CLI::App& c, OrthophotoFlags& flags) {
+    c.add_option("--from", flags.from,
+                 "the side that an orthophoto is seen from: above, or x, -x, y, -y, z or -z")
+        ->check(CLI::IsMember({"above", "x", "-x", "y", "-y", "z", "-z"}))
+        ->capture_default_str();
+    c.add_option("--pixel", flags.pixel, "side of an orthophoto's pixel, world units")
+        ->default_str("its longer side is 2048 px")
+        ->check(above_zero());
+}
 
 void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
     CLI::Option* const path =
@@ -505,11 +619,83 @@ void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
         ->excludes(path);
 }
 
+namespace {
+
+Camera first_camera(const CameraPath& path, const PixelSize& size) {
+    Navigation view;
+    apply(path.sample(0), view);
+    return view.camera(size.width, size.height);
+}
+
+// Where the orthophoto lies, for programs: in the scene's world, origin included.
+nlohmann::json orthophoto_json(const Orthophoto& photo, const glm::dvec3& origin) {
+    const glm::dmat3 rows = glm::transpose(photo.axes);
+    const glm::dvec3 corner = photo.corner + origin;
+    const auto list = [](const glm::dvec3& v) { return nlohmann::json{v.x, v.y, v.z}; };
+    return {{"width", photo.width},     {"height", photo.height}, {"pixel", photo.pixel},
+            {"right", list(rows[0])},   {"down", list(rows[1])},  {"forward", list(rows[2])},
+            {"top_left", list(corner)}, {"depth", photo.depth}};
+}
+
+}  // namespace
+
+int render_orthophoto(const RenderFlags& flags, const Accuracy& accuracy,
+                      const EffectChoice& choice) {
+    if (flags.data.resolution != -1)
+        throw Error("-r", "divides the size of cameras, and there are none", "Use --pixel.");
+    if (!flags.film.size.empty())
+        throw Error("--size", "an orthophoto is as large as the scene", "Use --pixel.");
+    SplatFile facts;
+    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, &facts, flags.units));
+    note_unused_choices(flags.accuracy, model.kernel);
+    const glm::dvec3 up = up_of_scene(flags, model, cameras_of_turn(flags), facts.up);
+    const bool above = flags.orthophoto.from == "above";
+    const Orthophoto photo =
+        orthophoto_of(model, {.from = above ? up : up_from_name(flags.orthophoto.from),
+                              .up = up,
+                              .pixel = flags.orthophoto.pixel});
+    const std::optional<std::string> map = world_file(photo, model.origin);
+    const Paths outputs{flags.output / "orthophoto.png", flags.output / "orthophoto.json",
+                        map ? flags.output / "orthophoto.pgw" : std::filesystem::path()};
+    refuse_to_overwrite_inputs(outputs, files_of(flags.scene));
+    const WrittenFiles written({}, flags.force);
+    written.check(outputs);
+    DeviceOptions device_options = command_device(flags.device);
+    Device device(device_options);
+    settle_tuning(device, flags.tune);
+    std::vector<View> views;
+    for (const OrthophotoTile& tile : tiles_of(photo)) views.emplace_back().camera = tile.camera;
+    EffectPlan plan =
+        plan_rendering(model, views, {.near_plane = tiles_of(photo).front().near_plane}, choice);
+    apply_plan(plan, model);
+    Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
+    const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
+    write_png(outputs[0], draw_orthophoto(photo, [&](const OrthophotoTile& tile) {
+                  const ImageF image =
+                      renderer.render(tile.camera, background, -1, tile.near_plane);
+                  plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
+                  return to_8bit(image);
+              }));
+    write_file_atomic(outputs[1], orthophoto_json(photo, model.origin).dump(1) + "\n");
+    if (map) write_file_atomic(outputs[2], *map);
+    written.wrote(outputs);
+    std::FILE* const out = flags.quiet ? nullptr : stdout;
+    tell(out, "effects: {}\n", plan_line(plan));
+    tell_paths(flags.quiet, outputs);
+    tell(out, "{}: {} x {} px of {:g} world units each{}\n", outputs[0].string(), photo.width,
+         photo.height, photo.pixel,
+         map ? "" : "; no world file, as the picture's sides are no axes of the world");
+    return 0;
+}
+
 int render_film(const RenderFlags& flags, const Accuracy& accuracy, const EffectChoice& choice) {
     if (!flags.depth.format.empty())
         throw Error("--depth", "goes with --cameras alone", "Name the cameras, or leave it out.");
     if (flags.data.resolution != -1)
         throw Error("-r", "divides the size of cameras, and there are none", "Use --size.");
+    if (flags.force)
+        throw Error("--force", "does not go with films, which replace only frames of theirs",
+                    "Name another folder, or delete the frames.");
     CameraPath path;
     if (!flags.film.path.empty()) path = read_camera_path(flags.film.path);
     say_notes(path.notes);
@@ -531,8 +717,14 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
     Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     AllAround around(renderer, plan, flags, near_plane);
-    PathExport film(
-        path, {flags.output, film_fps(flags.film, path), size.width, size.height, all_around, {}});
+    ExportOptions options{.folder = flags.output,
+                          .fps = film_fps(flags.film, path),
+                          .width = size.width,
+                          .height = size.height,
+                          .panorama = all_around};
+    options.blur = blur_of(flags, model, first_camera(path, size), "the film");
+    options.blur.shutter = flags.blur.shutter / 360 / options.fps;
+    PathExport film(path, options);
     while (!film.done())
         film.step(
             [&](const Camera& camera, const DisplaySettings&) {
