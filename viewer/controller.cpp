@@ -58,6 +58,9 @@ void Controller::show(LoadedScene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded.scene));
     painter_->open(*scene);
     painter_->begin_scene(document_->show(std::move(scene), loaded.asked_for, loaded.dropped));
+    Session& s = *session_;
+    if (s.scene->mesh) painter_->show_mesh(*std::exchange(s.scene->mesh, std::nullopt), true);
+    if (const fs::path mesh = document_->take_mesh_to_open(); !mesh.empty()) open_mesh(mesh);
 }
 
 void Controller::merge(LoadedScene loaded) {
@@ -123,6 +126,11 @@ void Controller::act(int width, int height) {
             document_->need_scene("search");
             painter_->start_search(find.least_views);
         },
+        [&](const request::PickPoint& at) { pick(at, width, height); },
+        [&](const request::OpenMesh& open) { open_mesh(open.file); },
+        [&](request::MakeMesh) { make_mesh(); },
+        [&](request::SaveMesh) { document_->save_mesh(); },
+        [&](request::CloseMesh) { painter_->close_mesh(); },
         [&](request::CancelLoad) { document_->cancel_load(); },
         [&](request::CancelWork) { painter_->cancel_work(); },
         [&](request::Quit) { quit(); },
@@ -156,6 +164,8 @@ void Controller::drop(const fs::path& path) {
     Session& s = *session_;
     if (s.training.live && !s.training.finished)
         s.tell("A run is shown; files can be opened when it is over.");
+    else if (s.scene && !s.scene->is_points && is_mesh_file(path))
+        open_mesh(path);  // it is shown with the scene
     else if (s.scene && s.edit.unsaved())
         s.leaving = Leaving{false, path};
     else
@@ -180,6 +190,42 @@ void Controller::show_edits() {
     if (!session_->scene) return;
     document_->follow_edits();
     painter_->show_edits();
+}
+
+void Controller::open_mesh(const fs::path& file) {
+    document_->need_scene("mesh");
+    check_mesh_file(file);
+    painter_->start_mesh(
+        [file](const MeshProgress& progress) { return read_shown_mesh(file, progress); });
+}
+
+void Controller::make_mesh() {
+    document_->need_scene("mesh");
+    if (session_->scene->is_points)
+        throw Error("mesh", "is made of splats, and the scene has only points",
+                    "Open a scene of splats, such as darb train makes.");
+    painter_->start_mesh_of_scene();
+}
+
+// Where a mesh is shown, points are on it; where it is among splats, else on these.
+void Controller::pick(const request::PickPoint& at, int width, int height) {
+    Session& s = *session_;
+    document_->need_scene("measuring");
+    const Camera camera = camera_in_window(s.photos, s.navigation, free_area(s, width, height));
+    const bool on_mesh = s.mesh && s.display.mesh != MeshShow::none;
+    std::optional<glm::dvec3> point;
+    if (on_mesh) point = point_on_mesh(s.mesh->mesh, camera, double{s.display.near_plane}, at.px);
+    if (!on_mesh && camera.lens.active && s.display.effects.lens)
+        throw Error("measuring", "the picture is bent by the photo's lens",
+                    "Turn the view a little, which leaves the photo's camera, or turn the effect "
+                    "lens off.");
+    if (!point && !(on_mesh && s.display.mesh == MeshShow::alone))
+        point = painter_->surface_at(camera, at.px);
+    if (point)
+        add_measured_point(*point, at.replaces, s);
+    else
+        s.tell("There is no surface at this point.");
+    painter_->unsettle();
 }
 
 void Controller::take_picture(int width, int height) {

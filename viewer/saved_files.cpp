@@ -12,6 +12,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/text.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/session.h"
 
@@ -213,7 +214,8 @@ std::vector<FolderEntry> list_folder(const std::filesystem::path& folder) {
         std::error_code none;
         const std::string name = at->path().filename().string();
         const bool is_folder = at->is_directory(none);
-        const bool is_scene = at->is_regular_file(none) && names_scene(at->path());
+        const bool is_scene = at->is_regular_file(none) &&
+                              (names_scene(at->path()) || has_extension(at->path(), ".obj"));
         if (!name.starts_with('.') && (is_folder || is_scene)) entries.push_back({name, is_folder});
     }
     std::sort(entries.begin(), entries.end(), [](const FolderEntry& a, const FolderEntry& b) {
