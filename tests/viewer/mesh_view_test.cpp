@@ -61,13 +61,14 @@ DrawnMesh drawn(const TriangleMesh& mesh, const Camera& camera, const DisplaySet
 TEST(MeshPicture, Has_the_depths_that_rays_find_in_double) {
     TriangleMesh mesh = torus_mesh(1, 0.35, 40, 24);
     add_faces(box_mesh({-3, -2, 2}, {3, 2, 2.5}), mesh);
+    Camera camera = looking_along_z(4);
+    camera.rotation = glm::dmat3(glm::rotate(glm::dmat4(1.0), 0.3, glm::dvec3(0.3, 1, 0.2)));
     TriangleMesh floor;
-    floor.position = {{-4, 0.8f, -9}, {4, 0.8f, -9}, {0, 0.8f, 6}};
+    for (const glm::dvec3& p : {glm::dvec3(-3, 0.3, -5), {3, 0.3, -5}, {0, 0.3, 12}})
+        floor.position.emplace_back(glm::transpose(camera.rotation) * (p - camera.translation));
     floor.face = {{0, 1, 2}};
     add_faces(floor, mesh);
     mesh.origin = {200, -300, 50};
-    Camera camera = looking_along_z(4);
-    camera.rotation = glm::dmat3(glm::rotate(glm::dmat4(1.0), 0.3, glm::dvec3(0.3, 1, 0.2)));
     camera.translation -= camera.rotation * glm::dvec3(200, -300, 50);
     DisplaySettings display;
     display.near_plane = 0.2f;
@@ -181,6 +182,7 @@ class MeshView : public ViewerTest {
         options_.up = "-y";
         make_viewer(options_);
         load(file_);
+        frame();  // which frames the scene
         session().navigation.eye = {0, 0, -4};
         session().navigation.axes = glm::dmat3(1.0);
         session().navigation.distance = 4;
@@ -194,7 +196,7 @@ class MeshView : public ViewerTest {
     }
     static glm::ivec3 at(const ImageU8& image, int x) {
         const int y = kHeight / 2;
-        return {image.at(y, x, 0), image.at(y, x, 1), image.at(y, x, 2)};
+        return {image.at(x, y, 0), image.at(x, y, 1), image.at(x, y, 2)};
     }
 };
 
@@ -296,6 +298,12 @@ TEST_F(MeshView, Is_made_of_the_scene_and_saved_and_can_be_cancelled) {
     EXPECT_NE(session().error.find("none to save"), std::string::npos) << session().error;
     session().error.clear();
     session().mesh_wish.voxel = 0.3f;
+    for (const double x : {-0.4, -0.2, 0.2, 0.4}) {
+        View view;
+        view.camera = session().navigation.camera(kWidth, kHeight);
+        view.camera.translation.x = x;
+        session().photos.views.push_back(view);
+    }
     session().ask(request::MakeMesh{});
     frame();
     EXPECT_GE(session().progress.mesh, 0);
@@ -333,7 +341,8 @@ TEST_F(MeshView, Clicks_measure_on_the_splats_and_give_the_scale) {
     const Camera c = camera();
     for (std::size_t i = 0; i < 2; ++i) {
         // Half opaque red alone leaves half of the light: the surface is blue's.
-        EXPECT_NEAR(points[i].z, 1, 0.05) << i;
+        // It begins a little before their middle.
+        EXPECT_NEAR(points[i].z, 1, 0.1) << i;
         const glm::dvec2 px = *pixel_of(c, points[i]);
         EXPECT_NEAR(px.x, (i == 0 ? 30 : 60) + 0.5, 1e-6);
         EXPECT_NEAR(px.y, (i == 0 ? 40 : 20) + 0.5, 1e-6);
@@ -369,7 +378,7 @@ TEST_F(MeshView, Clicks_measure_on_the_mesh_where_it_is_shown) {
     std::vector<glm::dvec3> points = session().edit.facts().measured.points;
     ASSERT_EQ(points.size(), 2u);
     EXPECT_NEAR(points[0].z, 0, 1e-6);
-    EXPECT_NEAR(points[1].z, 1, 0.05) << "beside the mesh, on the splats";
+    EXPECT_NEAR(points[1].z, 1, 0.1) << "beside the mesh, on the splats";
     session().display.mesh = MeshShow::alone;
     click({90, 20});
     EXPECT_EQ(session().edit.facts().measured.points.size(), 2u);

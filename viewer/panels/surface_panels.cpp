@@ -154,7 +154,7 @@ void measure_panel(Session& s) {
     tip("A click picks a point of the surface, a drag of a point moves it, a click on the first "
         "one "
         "closes the outline, Delete takes the last one away; other drags orbit");
-    const SceneFacts& facts = s.edit.facts();
+    const SceneFacts facts = s.edit.facts();  // a copy, as the buttons change it
     const Measurement& measured = facts.measured;
     if (measured.points.empty()) {
         ImGui::TextDisabled("Nothing is measured yet.");
