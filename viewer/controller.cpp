@@ -166,7 +166,7 @@ void Controller::drop(const fs::path& path) {
         s.tell("A run is shown; files can be opened when it is over.");
     else if (s.scene && !s.scene->is_points && is_mesh_file(path))
         open_mesh(path);  // it is shown with the scene
-    else if (s.scene && s.edit.unsaved())
+    else if (unsaved_edits(s) || unsaved_mesh(s))
         s.leaving = Leaving{false, path};
     else
         document_->load(path, true);
@@ -238,9 +238,9 @@ void Controller::take_picture(int width, int height) {
     session_->tell("picture in " + file.string());
 }
 
-// Asks first where edits are not saved.
+// Asks first where something is not saved.
 void Controller::quit() {
-    if (session_->scene && session_->edit.unsaved())
+    if (unsaved_edits(*session_) || unsaved_mesh(*session_))
         session_->leaving = Leaving{true, {}};
     else
         session_->for_window.push_back(WindowRequest::close);
@@ -258,7 +258,8 @@ void Controller::leave() {
 // Where saving fails, the viewer stays open and shows the message.
 void Controller::save_and_leave() {
     const std::optional<Leaving> leaving = std::exchange(session_->leaving, std::nullopt);
-    document_->save_scene(*device_);
+    if (unsaved_edits(*session_)) document_->save_scene(*device_);
+    if (unsaved_mesh(*session_)) document_->save_mesh();
     session_->leaving = leaving;
     leave();
 }

@@ -79,7 +79,7 @@ ShownMesh shown_mesh_of(TriangleMesh mesh, const fs::path& file, std::vector<std
 }
 
 ShownMesh read_shown_mesh(const fs::path& file, const MeshProgress& progress) {
-    if (progress) progress("reading the mesh", 0);
+    if (progress) progress("reading", 0);
     std::vector<std::string> notes;
     TriangleMesh mesh = read_mesh(file, &notes);
     return shown_mesh_of(std::move(mesh), file, std::move(notes));

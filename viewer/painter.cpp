@@ -116,7 +116,7 @@ void Painter::finish_mesh() {
 
 void Painter::note_mesh() {
     session_->progress.mesh = work_.mesh_share();
-    session_->progress.mesh_stage = work_.mesh_stage();
+    session_->progress.mesh_stage = "mesh: " + work_.mesh_stage();
 }
 
 void Painter::begin_motion() {

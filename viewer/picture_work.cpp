@@ -19,6 +19,7 @@ AccuracyMeasure::AccuracyMeasure(const Camera& camera, const DisplaySettings& di
     DisplaySettings now = display;
     now.mode = VIEW_COLOUR;
     now.style = SplatStyle::splats;
+    now.mesh = MeshShow::none;
     DisplaySettings exact = now;
     choose(kPresetRow, kExact, exact);
     exact.footprint = own.footprint;

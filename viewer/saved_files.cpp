@@ -13,6 +13,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/text.h"
+#include "engine/mesh/mesh_file.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/session.h"
 
@@ -193,6 +194,10 @@ std::string recover_unsaved(const Session& s) {
                     [&](const fs::path& file) {
                         save_splats(file, SplatFormat::ply, s.edit.apply(s.scene->model));
                     });
+    if (unsaved_mesh(s))
+        said += (said.empty() ? "" : ". ") +
+                keep("The mesh", s.mesh_file, s.mesh_file.stem().string(), ".glb",
+                     [&](const fs::path& file) { write_mesh(file, s.mesh->mesh); });
     if (s.path.unsaved())
         said += (said.empty() ? "" : ". ") +
                 keep("The camera path", s.path.file, s.path.file.stem().string(), ".json",

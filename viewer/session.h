@@ -158,6 +158,14 @@ struct AskedState {
 /// All three parts, for the panels.
 struct Session : ShownState, PaintedState, AskedState {};
 
+inline bool unsaved_edits(const ShownState& s) {
+    return s.scene && s.edit.unsaved();
+}
+/// Whether a mesh was made that is in no file.
+inline bool unsaved_mesh(const ShownState& s) {
+    return s.mesh && s.mesh->file.empty();
+}
+
 /// Draws the panels of one frame; progress, errors and questions also where session.panels is off.
 /// It needs an ImGui frame, whose coordinates it uses.
 void draw_panels(Session& session);

@@ -327,6 +327,7 @@ void set_ground(Session& s) {
     facts.up = *up;
     facts.ground = true;
     if (s.edit.state(facts, "set the ground: it is saved level", true) == 0) return;
+    leave_photo(s);
     s.navigation.set_up(*up);
     s.navigation.level();
     show_edit(1, s);
@@ -415,6 +416,7 @@ void show_step(const std::string& what, const char* said, Session& s) {
 void follow_up(const std::optional<glm::dvec3>& before, Session& s) {
     const std::optional<glm::dvec3>& up = s.edit.facts().up;
     if (!up || up == before) return;
+    leave_photo(s);
     s.navigation.set_up(*up);
     s.navigation.level();
 }

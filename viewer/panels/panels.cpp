@@ -66,15 +66,22 @@ void leaving_window(Session& s, float width, float height) {
     ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), 0, ImVec2(0.5f, 0.5f));
     ImGui::Begin("Not saved", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
-    ImGui::TextUnformatted("The edits of this scene have not been saved.");
-    path_field("file", s.save_file);
-    tip("The ending of the name decides the format");
+    if (unsaved_edits(s)) {
+        ImGui::TextUnformatted("The edits of this scene have not been saved.");
+        path_field("file", s.save_file);
+        tip("The ending of the name decides the format");
+    }
+    if (unsaved_mesh(s)) {
+        ImGui::TextUnformatted("The mesh that was made has not been saved.");
+        path_field("mesh file", s.mesh_file);
+        tip("The ending of the name decides the format");
+    }
     const bool quit = s.leaving->quit;
     if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.ask(request::SaveAndLeave{});
-    tip("Save to the file above first");
+    tip("Save as said above first");
     ImGui::SameLine();
     if (ImGui::Button(quit ? "Quit" : "Open")) s.ask(request::Leave{});
-    tip("The edits are lost");
+    tip("It is lost");
     ImGui::SameLine();
     if (ImGui::Button("Stay")) s.ask(request::Stay{});
     tip("Esc");
