@@ -145,7 +145,8 @@ void panes_panel(Session& s) {
     }
     const std::vector<std::string> names = pane_names(s);
     for (size_t i = 0; i < s.panes.psnr_db.size() && i + 1 < names.size(); ++i)
-        ImGui::TextUnformatted(pane_label(s, names, i + 1).c_str());
+        if (const std::string label = pane_label(s, names, i + 1); label != names[i + 1])
+            ImGui::TextUnformatted(label.c_str());
 }
 
 // What lies over the picture: the stroke that selects, the gizmo, and toasts that report what
