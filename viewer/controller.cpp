@@ -58,6 +58,9 @@ void Controller::show(LoadedScene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded.scene));
     painter_->open(*scene);
     painter_->begin_scene(document_->show(std::move(scene), loaded.asked_for, loaded.dropped));
+    Session& s = *session_;
+    if (s.scene->mesh) painter_->show_mesh(*std::exchange(s.scene->mesh, std::nullopt), true);
+    if (const fs::path mesh = document_->take_mesh_to_open(); !mesh.empty()) open_mesh(mesh);
 }
 
 void Controller::merge(LoadedScene loaded) {
@@ -123,6 +126,11 @@ void Controller::act(int width, int height) {
             document_->need_scene("search");
             painter_->start_search(find.least_views);
         },
+        [&](const request::PickPoint& at) { pick(at, width, height); },
+        [&](const request::OpenMesh& open) { open_mesh(open.file); },
+        [&](request::MakeMesh) { make_mesh(); },
+        [&](request::SaveMesh) { document_->save_mesh(); },
+        [&](request::CloseMesh) { painter_->close_mesh(); },
         [&](request::CancelLoad) { document_->cancel_load(); },
         [&](request::CancelWork) { painter_->cancel_work(); },
         [&](request::Quit) { quit(); },
@@ -156,7 +164,9 @@ void Controller::drop(const fs::path& path) {
     Session& s = *session_;
     if (s.training.live && !s.training.finished)
         s.tell("A run is shown; files can be opened when it is over.");
-    else if (s.scene && s.edit.unsaved())
+    else if (s.scene && !s.scene->is_points && is_mesh_file(path))
+        open_mesh(path);  // it is shown with the scene
+    else if (unsaved_edits(s) || unsaved_mesh(s))
         s.leaving = Leaving{false, path};
     else
         document_->load(path, true);
@@ -182,6 +192,42 @@ void Controller::show_edits() {
     painter_->show_edits();
 }
 
+void Controller::open_mesh(const fs::path& file) {
+    document_->need_scene("mesh");
+    check_mesh_file(file);
+    painter_->start_mesh(
+        [file](const MeshProgress& progress) { return read_shown_mesh(file, progress); });
+}
+
+void Controller::make_mesh() {
+    document_->need_scene("mesh");
+    if (session_->scene->is_points)
+        throw Error("mesh", "is made of splats, and the scene has only points",
+                    "Open a scene of splats, such as darb train makes.");
+    painter_->start_mesh_of_scene();
+}
+
+// Where a mesh is shown, points are on it; where it is among splats, else on these.
+void Controller::pick(const request::PickPoint& at, int width, int height) {
+    Session& s = *session_;
+    document_->need_scene("measuring");
+    const Camera camera = camera_in_window(s.photos, s.navigation, free_area(s, width, height));
+    const bool on_mesh = s.mesh && s.display.mesh != MeshShow::none;
+    std::optional<glm::dvec3> point;
+    if (on_mesh) point = point_on_mesh(s.mesh->mesh, camera, double{s.display.near_plane}, at.px);
+    if (!on_mesh && camera.lens.active && s.display.effects.lens)
+        throw Error("measuring", "the picture is bent by the photo's lens",
+                    "Turn the view a little, which leaves the photo's camera, or turn the effect "
+                    "lens off.");
+    if (!point && !(on_mesh && s.display.mesh == MeshShow::alone))
+        point = painter_->surface_at(camera, at.px);
+    if (point)
+        add_measured_point(*point, at.replaces, s);
+    else
+        s.tell("There is no surface at this point.");
+    painter_->unsettle();
+}
+
 void Controller::take_picture(int width, int height) {
     const bool of_run = document_->follows_run();
     if (!of_run) document_->need_scene("picture");
@@ -192,9 +238,9 @@ void Controller::take_picture(int width, int height) {
     session_->tell("picture in " + file.string());
 }
 
-// Asks first where edits are not saved.
+// Asks first where something is not saved.
 void Controller::quit() {
-    if (session_->scene && session_->edit.unsaved())
+    if (unsaved_edits(*session_) || unsaved_mesh(*session_))
         session_->leaving = Leaving{true, {}};
     else
         session_->for_window.push_back(WindowRequest::close);
@@ -212,7 +258,8 @@ void Controller::leave() {
 // Where saving fails, the viewer stays open and shows the message.
 void Controller::save_and_leave() {
     const std::optional<Leaving> leaving = std::exchange(session_->leaving, std::nullopt);
-    document_->save_scene(*device_);
+    if (unsaved_edits(*session_)) document_->save_scene(*device_);
+    if (unsaved_mesh(*session_)) document_->save_mesh();
     session_->leaving = leaving;
     leave();
 }

@@ -38,6 +38,9 @@ class Controller {
     void open_file(const std::filesystem::path& file, bool merges);
     void merge(LoadedScene loaded);
     void show_edits();
+    void open_mesh(const std::filesystem::path& file);
+    void make_mesh();
+    void pick(const request::PickPoint& at, int width, int height);
     void take_picture(int width, int height);
     void quit();
     void leave();

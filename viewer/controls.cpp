@@ -37,10 +37,13 @@ void step_training(Session& s) {
     ++s.training.steps_to_go;
 }
 
-// Removes the selection, or what is inside the box or sphere that is shown.
+// Removes the last measured point while measuring, else the selection, or what is inside the box or
+// sphere that is shown.
 void remove_selected(Session& s) {
     if (!s.scene || s.edit.transforms()) return;
-    if (s.edit.selected_count() > 0)
+    if (s.tools.tool == Tool::measure)
+        drop_measured_point(s);
+    else if (s.edit.selected_count() > 0)
         show_edit(s.edit.remove_selected(), s);
     else if (s.selection.shown)
         show_edit(s.edit.remove(s.scene->model, s.selection.region, true), s);

@@ -15,6 +15,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
+#include "engine/mesh/mesh_file.h"
 #include "engine/publish/device_clusters.h"
 #include "engine/publish/web_page.h"
 #include "engine/raster/forward_options.h"
@@ -111,7 +112,7 @@ bool Document::show(std::unique_ptr<Scene> scene, const fs::path& asked, bool dr
     session_->title = scene_name(asked, true) + " - darb";
     const Scene& s = *session_->scene;
     session_->sh_degree = s.model.sh_degree;
-    session_->edit = Edit(s.model.size());
+    session_->edit = Edit(s.model.size(), s.model.metres_per_unit);
     session_->tools = {};
     session_->tools.grow = static_cast<float>(s.subject.radius / 50);
     session_->tools.scale[1] = static_cast<float>(s.subject.radius / 10);
@@ -124,10 +125,13 @@ bool Document::show(std::unique_ptr<Scene> scene, const fs::path& asked, bool dr
     session_->selection.region = {Region::Shape::box, s.subject.centre,
                                   glm::dvec3(s.subject.radius)};
     session_->save_file = edited_name(s.file);
+    session_->mesh_file = session_->save_file.parent_path() / (scene_name(s.file) + "_mesh.glb");
+    session_->mesh_wish = {};
     session_->fly_speed = s.subject.radius / 2;
     show_as_meant(s, first);
-    tell(options_.quiet ? nullptr : stdout, "loaded {}: {} splats in {:.2f} s\neffects: {}\n",
-         s.file.string(), s.model.size(), s.load_s, plan_line(*session_->plan));
+    const std::string what = s.mesh ? s.format : fmt::format("{} splats", s.model.size());
+    tell(options_.quiet ? nullptr : stdout, "loaded {}: {} in {:.2f} s\neffects: {}\n",
+         s.file.string(), what, s.load_s, plan_line(*session_->plan));
     for (const std::string& note : s.is_points ? std::vector<std::string>{} : s.notes)
         say("warning: {}: {}\n", s.file.string(), note);
     if (first) session_->navigation.level();
@@ -405,7 +409,8 @@ void Document::save_scene(Device& device) {
                     "Use " + endings_to_write() + ".");
     saved_.check(s.save_file);
     SplatModel model = s.edit.apply(s.scene->model);
-    if (s.save_upright) transform_splats({.turn = turn_to_up(s.navigation.up)}, model);
+    if (s.save_upright || s.edit.facts().ground)
+        transform_splats({.turn = turn_to_up(s.navigation.up)}, model);
     DeviceClusters clusters(device);
     EncodeOptions options;
     options.assign_rows = clusters.assign_rows();
@@ -415,6 +420,18 @@ void Document::save_scene(Device& device) {
     std::string said = fmt::format("saved {} splats to {}", model.size(), s.save_file.string());
     for (const std::string& loss : losses_of(*format, model)) said += "\n" + loss;
     s.tell(said);
+}
+
+void Document::save_mesh() {
+    Session& s = *session_;
+    if (!s.mesh)
+        throw Error("mesh", "there is none to save", "Make one, or open one, in the section Mesh.");
+    saved_.check(s.mesh_file);
+    write_mesh(s.mesh_file, s.mesh->mesh);
+    saved_.wrote(s.mesh_file);
+    s.mesh->file = s.mesh_file;
+    s.tell(fmt::format("saved a mesh of {} faces to {}", s.mesh->mesh.face_count(),
+                       s.mesh_file.string()));
 }
 
 // The page opens at the window's view, and the cameras of the photos follow.

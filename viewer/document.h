@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "viewer/live_picture.h"
@@ -19,13 +20,14 @@
 namespace darb {
 
 struct ViewerOptions {
-    std::vector<View> views;  // cameras of a data set; may be empty
-    std::string up;           // x, -x, ...; "" = from the cameras, else remembered or guessed
-    StoredUnits units;        // the units of the scenes that `open` names
-    bool quiet = false;       // whether to stay silent about what was loaded
-    float gui_scale = 0;      // size of the panels; 0: as the display prefers
-    Accuracy accuracy;        // the accuracy to start with
-    EffectChoice effects;     // applied on top of what a scene asks for
+    std::vector<View> views;     // cameras of a data set; may be empty
+    std::filesystem::path mesh;  // shown with the first scene; empty: none
+    std::string up;              // x, -x, ...; "" = from the cameras, else remembered or guessed
+    StoredUnits units;           // the units of the scenes that `open` names
+    bool quiet = false;          // whether to stay silent about what was loaded
+    float gui_scale = 0;         // size of the panels; 0: as the display prefers
+    Accuracy accuracy;           // the accuracy to start with
+    EffectChoice effects;        // applied on top of what a scene asks for
     /// Maps a path to the file that it means (an output folder means its last scene). Throws Error.
     std::function<std::filesystem::path(const std::filesystem::path&)> resolve;
     /// Finds cameras that lie beside a scene, for one that is dropped. Without such a function the
@@ -89,6 +91,11 @@ class Document {
     void follow_plan();
     /// Keeps the up direction for the next time where the user has changed it. Throws Error.
     void remember_up();
+
+    /// The mesh that ViewerOptions name, once.
+    std::filesystem::path take_mesh_to_open() { return std::exchange(options_.mesh, {}); }
+    /// Saves the mesh that is shown. Throws Error where there is none.
+    void save_mesh();
 
     void load_path();
     void save_path();

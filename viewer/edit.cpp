@@ -462,6 +462,13 @@ std::size_t Edit::merge(SplatModel added, SplatModel& model) {
     return count;
 }
 
+std::size_t Edit::state(const SceneFacts& facts, std::string what, bool content) {
+    if (facts == facts_) return 0;
+    push({std::move(what), content ? ++last_id_ : 0, Stated{std::exchange(facts_, facts)}});
+    ++version_;
+    return 1;
+}
+
 std::vector<std::size_t> Edit::parts() const {
     std::vector<std::size_t> parts = {removed_.size()};
     for (std::size_t i = 0; i < done_; ++i)
@@ -485,6 +492,9 @@ void Edit::apply_step(Step& step, bool forward, SplatModel& model) {
             append(*merged, model);
         else
             cut(*merged, model);
+    } else if (auto* stated = std::get_if<Stated>(&step.change)) {
+        std::swap(stated->other, facts_);
+        ++version_;
     }
 }
 
@@ -529,6 +539,7 @@ bool Edit::unsaved() const {
 
 SplatModel Edit::apply(const SplatModel& model) const {
     SplatModel out = model;
+    out.metres_per_unit = facts_.metres_per_unit;
     keep_splats([&](std::size_t i) { return removed_[i] == 0; }, out);
     return out;
 }

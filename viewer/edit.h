@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Edit: what was done to a scene since it was opened, step by step, with undo and redo. Splats can
-// be selected, hidden, deleted and moved, and scenes can be merged into the scene. Marks lie beside
-// the model; moves and merges change the model, which the caller keeps and hands over. It must
-// always be the same one.
+// be selected, hidden, deleted and moved, scenes can be merged into the scene, and facts about it
+// can be stated. Marks and facts lie beside the model; moves and merges change the model, which the
+// caller keeps and hands over. It must always be the same one.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +16,7 @@
 #include "engine/scene/clutter.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_model.h"
+#include "viewer/measure.h"
 
 namespace darb {
 
@@ -45,8 +46,11 @@ enum class Combine { replace, add, subtract };
 
 class Edit {
   public:
-    explicit Edit(std::size_t splats = 0)
-        : removed_(splats, 0), hidden_(splats, 0), selected_(splats, 0) {}
+    /// metres_per_unit: of the scene as it was opened; 0: not known.
+    explicit Edit(std::size_t splats = 0, double metres_per_unit = 0)
+        : removed_(splats, 0), hidden_(splats, 0), selected_(splats, 0) {
+        facts_.metres_per_unit = metres_per_unit;
+    }
 
     // Each of these is a step unless it changes nothing. They return how many splats changed.
     // Hidden and deleted splats are never selected.
@@ -72,6 +76,14 @@ class Edit {
     /// cannot hold both: the kernels differ, or only one has some attribute. Harmonics of the
     /// lesser degree get zeros.
     std::size_t merge(SplatModel added, SplatModel& model);
+
+    /// What is known of the scene besides its splats.
+    const SceneFacts& facts() const { return facts_; }
+    /// One step, which replaces the facts. what: what it did, for messages; content: whether a
+    /// saved file would differ. Returns 0 where they are the same, else 1.
+    std::size_t state(const SceneFacts& facts, std::string what, bool content);
+    /// Says which way is up without a step, so that undoing a ground leads back there.
+    void note_up(const glm::dvec3& up) { facts_.up = up; }
 
     /// Counts of splats: of the scene as it was opened, then of each scene merged into it, in
     /// order.
@@ -107,7 +119,7 @@ class Edit {
     /// Selections and hidden splats are not saved.
     bool unsaved() const;
     void mark_saved() { saved_ = content(); }
-    /// The scene without the deleted splats, in the same order.
+    /// The scene without the deleted splats, in the same order, with the unit of the facts.
     SplatModel apply(const SplatModel& model) const;
 
   private:
@@ -123,10 +135,13 @@ class Edit {
         int degree = 0;                       // the model's degree before
         std::vector<std::uint32_t> selected;  // the selection before
     };
+    struct Stated {
+        SceneFacts other;  // before a step that is done, else after it
+    };
     struct Step {
         std::string what;
         int id = 0;  // the content from here on; 0: as before
-        std::variant<Marks, Moved, Merged> change;
+        std::variant<Marks, Moved, Merged, Stated> change;
     };
     void push(Step step);
     std::size_t mark(const char* verb, Marks marks, bool content);
@@ -138,6 +153,7 @@ class Edit {
     void changed_model() { ++model_version_, ++seen_version_, ++version_; }
 
     SplatSet removed_, hidden_, selected_;
+    SceneFacts facts_;
     std::vector<Step> steps_;
     std::size_t done_ = 0;  // how many of steps_ are done
     std::size_t removed_count_ = 0, hidden_count_ = 0, selected_count_ = 0;

@@ -27,7 +27,7 @@ enum class Key {
     hide,
     show_hidden,  // Ctrl H, U
     open,         // Ctrl O
-    // 1 to 8, in the order of Tool.
+    // 1 to 9, in the order of Tool.
     tool_navigate,
     tool_rectangle,
     tool_lasso,
@@ -36,6 +36,7 @@ enum class Key {
     tool_move,
     tool_turn,
     tool_scale,
+    tool_measure,
     remove,  // Delete
     undo,    // Ctrl Z
     redo,    // Ctrl Y
@@ -93,7 +94,17 @@ struct CancelLoad {};
 struct FindFreeSpace {
     int least_views = 3;
 };                     // selects the splats that so many photos look through
-struct CancelWork {};  // an export, a measurement or a search
+struct CancelWork {};  // an export, a measurement, a search or a mesh
+struct PickPoint {
+    glm::dvec2 px{0.0};  // of the window
+    int replaces = -1;   // the measured point that moves there; -1: a new one
+};
+struct OpenMesh {
+    std::filesystem::path file;
+};                   // shows a mesh with the scene
+struct MakeMesh {};  // of the scene, as session.mesh_wish says
+struct SaveMesh {};
+struct CloseMesh {};
 struct Quit {};
 // Answers to the question that session.leaving asks.
 struct SaveAndLeave {};
@@ -110,8 +121,9 @@ using Request =
                  request::LeavePhoto, request::FollowPlan, request::Measure, request::ShowOpen,
                  request::Open, request::ShowEdits, request::Save, request::SavePage,
                  request::LoadPath, request::SavePath, request::ExportPath, request::CancelLoad,
-                 request::FindFreeSpace, request::CancelWork, request::Quit, request::SaveAndLeave,
-                 request::Leave, request::Stay, request::ToggleFullScreen,
+                 request::FindFreeSpace, request::CancelWork, request::PickPoint, request::OpenMesh,
+                 request::MakeMesh, request::SaveMesh, request::CloseMesh, request::Quit,
+                 request::SaveAndLeave, request::Leave, request::Stay, request::ToggleFullScreen,
                  request::LeaveFullScreen>;
 using RequestQueue = std::vector<Request>;
 

@@ -2,6 +2,8 @@
 // Makes the pictures of a scene as each frame's pacing wants them, and measures what they cost.
 #include "viewer/painter.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -58,12 +60,63 @@ Painter::~Painter() {
 
 void Painter::open(const Scene& scene) {
     picture_.set_scene(scene.model, scene.bounds, scene.important);
+    work_.cancel_mesh();  // it was of another scene
+    if (session_->mesh) close_mesh();
     under_way_.clear();
     copies_.at = 0;
     warm_up_.thread.reset();
     lose_scene("another scene was opened");
     begin_motion();
     shown_model_ = shown_edit_ = 0;
+}
+
+void Painter::show_mesh(ShownMesh mesh, bool alone) {
+    picture_.set_mesh(&mesh.mesh);
+    session_->mesh = std::make_unique<ShownMesh>(std::move(mesh));
+    MeshShow& shown = session_->display.mesh;
+    if (alone)
+        shown = MeshShow::alone;
+    else if (shown == MeshShow::none)
+        shown = MeshShow::both;
+    ++version_;
+}
+
+void Painter::close_mesh() {
+    picture_.set_mesh(nullptr);
+    session_->mesh.reset();
+    session_->display.mesh = MeshShow::none;
+    ++version_;
+}
+
+void Painter::start_mesh_of_scene() {
+    std::vector<View> views;
+    for (const View& view : session_->photos.views)  // without the photos
+        views.emplace_back().camera = view.camera;
+    start_mesh([device = options_.second_device.value_or(DeviceOptions()),
+                tuning = device_->tuning(), model = session_->edit.apply(session_->scene->model),
+                views = std::move(views),
+                wish = session_->mesh_wish](const MeshProgress& progress) {
+        return make_shown_mesh(device, tuning, model, views, wish, progress);
+    });
+}
+
+void Painter::take_mesh(bool wait) {
+    std::optional<ShownMesh> mesh = work_.take_mesh(wait);
+    if (!mesh) return;
+    std::string said = fmt::format("a mesh of {} faces", mesh->mesh.face_count());
+    for (const std::string& note : mesh->notes) said += "\n" + note;
+    show_mesh(std::move(*mesh));
+    session_->tell(said);
+}
+
+void Painter::finish_mesh() {
+    take_mesh(true);
+    note_mesh();
+}
+
+void Painter::note_mesh() {
+    session_->progress.mesh = work_.mesh_share();
+    session_->progress.mesh_stage = "mesh: " + work_.mesh_stage();
 }
 
 void Painter::begin_motion() {
@@ -271,8 +324,13 @@ void Painter::pace_picture(const PaintedFrame& frame, bool works) {
 }
 
 std::vector<DisplaySettings> Painter::shown_displays() const {
-    return pane_displays(session_->display,
-                         kernels_beside(session_->panes, session_->display.kernel));
+    DisplaySettings display = session_->display;
+    const bool beside = display.mesh == MeshShow::beside && picture_.has_mesh();
+    if (display.mesh == MeshShow::beside) display.mesh = MeshShow::none;
+    std::vector<DisplaySettings> displays =
+        pane_displays(display, kernels_beside(session_->panes, display.kernel));
+    if (beside) displays.emplace_back(display).mesh = MeshShow::alone;
+    return displays;
 }
 
 bool Painter::ready_to_move() const {
@@ -524,6 +582,8 @@ void Painter::step_work() {
     if (work_.measures())
         session_->attempt([&] { session_->measured = work_.step_measure(picture_); });
     if (work_.searches()) session_->attempt([&] { step_search(); });
+    if (work_.meshes()) session_->attempt([&] { take_mesh(false); });
+    note_mesh();
     session_->progress.exporting = work_.export_share();
     session_->progress.measuring = work_.measure_share();
     session_->progress.searching = work_.search_share();

@@ -31,7 +31,8 @@ struct PainterOptions {
     float gui_scale = 1;
     /// Called from other threads when there is something new to show.
     std::function<void()> wake;
-    /// A device like this one, which compiles while the last picture of a run is shown.
+    /// A device like this one, which compiles while the last picture of a run is shown, and makes
+    /// meshes.
     std::optional<DeviceOptions> second_device;
 };
 
@@ -68,6 +69,19 @@ class Painter {
     void begin_scene(bool of_run);
     /// Shows edits: other splats are deleted, selected or moved now. Throws Error.
     void show_edits();
+    /// Shows a mesh with the scene: alone, or as the display says, where that asks for none among
+    /// the splats. Throws Error and keeps the previous one.
+    void show_mesh(ShownMesh mesh, bool alone = false);
+    void close_mesh();
+    /// Reads a mesh or makes one of the scene on a thread, and shows it.
+    void start_mesh(MeshJob::Work work) { work_.start_mesh(std::move(work), options_.wake); }
+    void start_mesh_of_scene();
+    /// Waits for the mesh that is being read or made. Throws its Error.
+    void finish_mesh();
+    /// The point of the splats' surface in a pixel of the window; see SplatPicture.
+    std::optional<glm::dvec3> surface_at(const Camera& camera, const glm::dvec2& px) {
+        return picture_.surface_at(camera, session_->display, px);
+    }
     /// From now on shows the pictures that a run makes.
     void begin_run();
     void show_picture_of_run(const LiveMade& made);
@@ -149,6 +163,8 @@ class Painter {
     void rehearse_motion(const PictureKey& key);
     void step_work();
     void step_search();
+    void take_mesh(bool wait);
+    void note_mesh();
     void start_levels();
     void take_levels();
     void lose_levels();

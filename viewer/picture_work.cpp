@@ -19,6 +19,7 @@ AccuracyMeasure::AccuracyMeasure(const Camera& camera, const DisplaySettings& di
     DisplaySettings now = display;
     now.mode = VIEW_COLOUR;
     now.style = SplatStyle::splats;
+    now.mesh = MeshShow::none;
     DisplaySettings exact = now;
     choose(kPresetRow, kExact, exact);
     exact.footprint = own.footprint;
@@ -110,7 +111,28 @@ void PictureWork::start_search(Device& device, const SplatModel& model,
     search_ = std::make_unique<FreeSpaceSearch>(device, model, cameras, options);
 }
 
+void PictureWork::start_mesh(MeshJob::Work work, std::function<void()> wake) {
+    cancel_mesh();
+    mesh_ = std::make_unique<MeshJob>(std::move(work), std::move(wake));
+}
+
+// The thread ends at its next report of progress; nobody waits for that.
+void PictureWork::cancel_mesh() {
+    std::erase_if(ended_, [](const auto& job) { return job->done(); });
+    if (!mesh_) return;
+    mesh_->cancel();
+    ended_.push_back(std::move(mesh_));
+}
+
+std::optional<ShownMesh> PictureWork::take_mesh(bool wait) {
+    if (!mesh_) return {};
+    if (wait) mesh_->wait();
+    if (!mesh_->done()) return {};
+    return std::exchange(mesh_, nullptr)->take();
+}
+
 void PictureWork::cancel() {
+    cancel_mesh();
     export_.reset();
     measure_.reset();
     search_.reset();

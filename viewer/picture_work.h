@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// PictureWork: work that draws pictures of its own while the window lives, one picture a frame. It
-// is the export of a camera path, the measurement of settings and effects, or the search for splats
-// in free space. They may run at a time.
+// PictureWork: work that goes on while the window lives. Some draws pictures of its own, one
+// picture a frame: the export of a camera path, the measurement of settings and effects, or the
+// search for splats in free space. A mesh is read or made by a thread. They may run at a time.
 #pragma once
 
 #include <atomic>
@@ -22,6 +22,7 @@
 #include "engine/scene/clutter.h"
 #include "engine/scene/splat_model.h"
 #include "viewer/display.h"
+#include "viewer/mesh_work.h"
 #include "viewer/path_export.h"
 #include "viewer/session.h"
 #include "viewer/splat_picture.h"
@@ -83,6 +84,9 @@ class PictureWork {
     /// model: must stay as it is until the search ends. cameras: see evenly_chosen.
     void start_search(Device& device, const SplatModel& model, const std::vector<Camera>& cameras,
                       const FreeSpaceOptions& options);
+    /// Ends the reading or making of an earlier mesh. wake: see MeshJob.
+    void start_mesh(MeshJob::Work work, std::function<void()> wake);
+    void cancel_mesh();
     void cancel();
     /// Ends the work, because the scene that it shows is gone. Returns what there is to say, or "".
     std::string lose_scene(const char* why);
@@ -90,6 +94,7 @@ class PictureWork {
     bool exports() const { return export_.has_value(); }
     bool measures() const { return measure_.has_value(); }
     bool searches() const { return search_ != nullptr; }
+    bool meshes() const { return mesh_ != nullptr; }
     /// Whether the next step draws into the picture, or takes the time that one would take.
     bool draws() const { return measures() || searches() || (exports() && !export_->has_frames()); }
     double export_share() const {
@@ -97,6 +102,8 @@ class PictureWork {
     }  // negative: there is none
     double measure_share() const { return measure_ ? measure_->share() : -1; }
     double search_share() const { return search_ ? search_->share() : -1; }
+    double mesh_share() const { return mesh_ ? mesh_->share() : -1; }
+    std::string mesh_stage() const { return mesh_ ? mesh_->stage() : ""; }
 
     /// Draws one picture of the export. Once all are there, it looks whether the video is done, or
     /// waits for it with `wait`. Returns what was written where that ends the export. A failed
@@ -106,11 +113,15 @@ class PictureWork {
     std::vector<MeasuredChoice> step_measure(SplatPicture& picture);
     /// Asks one camera. Returns what was found once all were asked. Throws Error.
     std::optional<SplatSet> step_search();
+    /// The mesh, once it is there; wait: waits for it. Throws Error where there is none.
+    std::optional<ShownMesh> take_mesh(bool wait = false);
 
   private:
     std::optional<PathExport> export_;
     std::optional<AccuracyMeasure> measure_;
     std::unique_ptr<FreeSpaceSearch> search_;
+    std::unique_ptr<MeshJob> mesh_;
+    std::vector<std::unique_ptr<MeshJob>> ended_;  // cancelled ones whose threads still run
 };
 
 /// Converts B8G8R8A8 [height][width] to RGB.

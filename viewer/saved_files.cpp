@@ -12,6 +12,8 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/text.h"
+#include "engine/mesh/mesh_file.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/session.h"
 
@@ -192,6 +194,10 @@ std::string recover_unsaved(const Session& s) {
                     [&](const fs::path& file) {
                         save_splats(file, SplatFormat::ply, s.edit.apply(s.scene->model));
                     });
+    if (unsaved_mesh(s))
+        said += (said.empty() ? "" : ". ") +
+                keep("The mesh", s.mesh_file, s.mesh_file.stem().string(), ".glb",
+                     [&](const fs::path& file) { write_mesh(file, s.mesh->mesh); });
     if (s.path.unsaved())
         said += (said.empty() ? "" : ". ") +
                 keep("The camera path", s.path.file, s.path.file.stem().string(), ".json",
@@ -213,7 +219,8 @@ std::vector<FolderEntry> list_folder(const std::filesystem::path& folder) {
         std::error_code none;
         const std::string name = at->path().filename().string();
         const bool is_folder = at->is_directory(none);
-        const bool is_scene = at->is_regular_file(none) && names_scene(at->path());
+        const bool is_scene = at->is_regular_file(none) &&
+                              (names_scene(at->path()) || has_extension(at->path(), ".obj"));
         if (!name.starts_with('.') && (is_folder || is_scene)) entries.push_back({name, is_folder});
     }
     std::sort(entries.begin(), entries.end(), [](const FolderEntry& a, const FolderEntry& b) {

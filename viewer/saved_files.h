@@ -62,9 +62,10 @@ class RememberedUp {
 // Recovery: writes what a session has not saved into new files where its window ends without a
 // question, because the display is gone, a signal comes or a device fails.
 
-/// Writes the edited scene and the camera path that were not saved. They go beside the scene or,
-/// where that cannot be written, into the current or the temporary folder, as NAME_recovered.ply
-/// and camera_path_recovered.json, with a number where those exist. Returns a sentence for each,
+/// Writes the edited scene, the mesh that was made and the camera path that were not saved. They go
+/// beside the scene or, where that cannot be written, into the current or the temporary folder, as
+/// NAME_recovered.ply, NAME_mesh_recovered.glb and camera_path_recovered.json, with a number where
+/// those exist. Returns a sentence for each,
 /// with the file or with the reason why there is none; empty where nothing was unsaved. Never
 /// throws Error.
 std::string recover_unsaved(const Session& session);

@@ -12,6 +12,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/point_cloud_ply.h"
+#include "engine/mesh/mesh_file.h"
 #include "engine/scene/splat_file.h"
 
 namespace darb {
@@ -41,6 +42,45 @@ std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
                      "reading");
     }
     return bytes;
+}
+
+constexpr std::size_t kMostVertices = 100'000;  // that stand for a mesh
+
+// A mesh's vertices, evenly chosen, are what is framed and orbited.
+PointCloud vertices_of(const TriangleMesh& mesh) {
+    PointCloud points;
+    const std::size_t step = (mesh.vertex_count() + kMostVertices - 1) / kMostVertices;
+    for (std::size_t v = 0; v < mesh.vertex_count(); v += step) {
+        for (int c = 0; c < 3; ++c) {
+            points.position.push_back(mesh.origin[static_cast<std::size_t>(c)] +
+                                      double{mesh.position[v][c]});
+            points.colour.push_back(mesh.colour.empty() ? 128 : mesh.colour[v][c]);
+        }
+    }
+    return points;
+}
+
+Scene mesh_scene_of(std::span<const std::byte> bytes, const std::filesystem::path& folder,
+                    Scene scene, const LoadProgress& progress) {
+    const auto start = std::chrono::steady_clock::now();
+    if (progress) progress(kReadShare, "decoding");
+    std::vector<std::string> notes;
+    TriangleMesh mesh = parse_mesh(bytes, scene.file.string(), folder, &notes);
+    const bool has_faces = mesh.face_count() > 0;
+    if (progress) progress(kReadShare + kDecodeShare, "measuring");
+    scene.model = points_as_splats(vertices_of(mesh));
+    scene.is_points = true;
+    scene.format = has_faces ? fmt::format("mesh of {} faces", mesh.face_count()) : "point cloud";
+    scene.notes = notes;
+    if (has_faces) {
+        scene.mesh = shown_mesh_of(std::move(mesh), scene.file, {});
+        for (const std::string& note : scene.mesh->notes) scene.notes.push_back(note);
+    } else {
+        scene.notes.emplace_back("It has no faces. Points are shown as opaque balls.");
+    }
+    measure_scene(scene);
+    scene.load_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return scene;
 }
 
 }  // namespace
@@ -87,6 +127,7 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
             parse_point_cloud_ply(bytes, header, file.string(), facts.dropped, &facts.notes));
     };
     const std::filesystem::path folder = inner.has_parent_path() ? inner.parent_path() : ".";
+    if (holds_mesh(bytes, inner)) return mesh_scene_of(bytes, folder, std::move(scene), progress);
     scene.model = parse_splats(bytes, inner.string(), &facts, decoding, folder, read_points, units);
     scene.format = scene.is_points ? "point cloud" : std::string(format_name(facts.format));
     scene.notes = facts.notes;

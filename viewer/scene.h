@@ -17,6 +17,7 @@
 #include "engine/scene/splat_model.h"
 #include "engine/scene/stored_units.h"
 #include "viewer/bounds.h"
+#include "viewer/mesh_work.h"
 
 namespace darb {
 
@@ -27,6 +28,7 @@ struct Scene {
     Subject subject;         // what the cameras look at
     std::string format;      // a name from format_name
     bool is_points = false;  // whether it is a point cloud, without splat parameters in the file
+    std::optional<ShownMesh> mesh;         // where the file holds one; its vertices are the points
     std::vector<std::uint32_t> important;  // what is drawn in motion, most important first
     std::string up;                        // a value of --up where the file says it; else empty
     double load_s = 0;
@@ -40,7 +42,8 @@ void measure_scene(Scene& scene);
 /// pipe.
 void check_scene_file(const std::filesystem::path& file);
 
-/// Reads a file that load_splats knows, or a PLY point cloud, which becomes small opaque splats.
+/// Reads a file that load_splats knows, or a PLY point cloud or a mesh, whose points become small
+/// opaque splats.
 /// `progress` is called with a share of 0 to 1 and what is being done; it throws to cancel. Throws
 /// an Error that names the file.
 using LoadProgress = std::function<void(double share, const char* stage)>;

@@ -18,6 +18,7 @@
 #include "viewer/display.h"
 #include "viewer/edit.h"
 #include "viewer/input.h"
+#include "viewer/mesh_work.h"
 #include "viewer/navigation.h"
 #include "viewer/panes.h"
 #include "viewer/photo_compare.h"
@@ -72,8 +73,8 @@ struct MeasuredChoice {
 
 /// Shares from 0 to 1; negative where no such work goes on.
 struct WorkProgress {
-    double load = -1, exporting = -1, measuring = -1, searching = -1;
-    std::string load_stage;
+    double load = -1, exporting = -1, measuring = -1, searching = -1, mesh = -1;
+    std::string load_stage, mesh_stage;
 };
 
 /// A message over the picture, shown for some seconds.
@@ -107,6 +108,9 @@ struct ShownState {
     Edit edit;
     Selection selection;
     std::filesystem::path save_file;
+    std::unique_ptr<ShownMesh> mesh;  // null: none
+    MeshWish mesh_wish;
+    std::filesystem::path mesh_file;  // where a mesh is saved
     Navigation navigation;
     double fly_speed = 1;            // world units a second
     std::optional<EffectPlan> plan;  // the plan for the scene
@@ -153,6 +157,14 @@ struct AskedState {
 
 /// All three parts, for the panels.
 struct Session : ShownState, PaintedState, AskedState {};
+
+inline bool unsaved_edits(const ShownState& s) {
+    return s.scene && s.edit.unsaved();
+}
+/// Whether a mesh was made that is in no file.
+inline bool unsaved_mesh(const ShownState& s) {
+    return s.mesh && s.mesh->file.empty();
+}
 
 /// Draws the panels of one frame; progress, errors and questions also where session.panels is off.
 /// It needs an ImGui frame, whose coordinates it uses.

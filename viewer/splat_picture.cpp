@@ -69,12 +69,40 @@ void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
     own_ = GpuSplats(*device_, model, false);
     styled_.reset();
     some_.reset();
+    probe_.reset();
     drop_levels();
     live_ = nullptr;
     model_ = &model;
     bounds_ = bounds;
     marks_ = {};
     important_ = std::move(important);
+}
+
+void SplatPicture::set_mesh(const TriangleMesh* mesh) {
+    std::optional<MeshPicture> made;
+    if (mesh) made.emplace(*device_, *mesh);
+    settle();
+    mesh_ = std::move(made);
+}
+
+MeshShow SplatPicture::shown_mesh(const DisplaySettings& display) const {
+    const bool shown = mesh_ && display.mode == VIEW_COLOUR && display.mesh != MeshShow::beside;
+    return shown ? display.mesh : MeshShow::none;
+}
+
+std::optional<glm::dvec3> SplatPicture::surface_at(const Camera& camera,
+                                                   const DisplaySettings& display,
+                                                   const glm::dvec2& px) {
+    if (!own_) return {};
+    settle();
+    DisplaySettings plain = display;  // as the splats are, however they are shown
+    plain.style = SplatStyle::splats;
+    plain.mode = VIEW_COLOUR;
+    plain.mesh = MeshShow::none;
+    const Key key = key_for(plain, false);
+    if (!probe_ || !probe_->is_for(key.kernel, key.effects))
+        probe_.emplace(*device_, options_for(key));
+    return probe_->find(*own_, camera, display.near_plane, px);
 }
 
 void SplatPicture::set_live(const GpuSplats& splats, const Bounds& bounds) {
@@ -85,6 +113,8 @@ void SplatPicture::set_live(const GpuSplats& splats, const Bounds& bounds) {
 
 void SplatPicture::clear() {
     settle();
+    mesh_.reset();
+    probe_.reset();
     own_.reset();
     styled_.reset();
     some_.reset();
@@ -211,8 +241,8 @@ ForwardOptions SplatPicture::options_for(const Key& key) {
     options.backward_follows = false;
     if (key.ellipsoids) options.alpha_cutoff = kEllipsoidCutoff;
     // The passes of these modes read and write the layout that these options choose.
-    if (key.store) options.depth_order = DEPTH_ORDER_CENTRE;
-    if (key.store || key.depth) options.storage = STORAGE_FLOAT32;
+    if (key.store || key.mesh) options.depth_order = DEPTH_ORDER_CENTRE;
+    if (key.store || key.depth || key.mesh) options.storage = STORAGE_FLOAT32;
     return options;
 }
 
@@ -229,6 +259,7 @@ SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool mov
     key.huge_splat_path = display.huge_splat_path;
     key.store = display.mode == VIEW_COUNT;
     key.depth = display.mode == VIEW_DEPTH;
+    key.mesh = shown_mesh(display) == MeshShow::both;
     key.ellipsoids = display.style == SplatStyle::ellipsoids && own_;
     if (key.ellipsoids) {
         key.kernel = KERNEL_GAUSSIAN;
@@ -249,8 +280,10 @@ SplatPicture::Slot& SplatPicture::slot_for(const GpuSplats& splats, const Displa
     settle();
     slot.buffers.reset();
     slot.forward.reset();
+    slot.mesh_blend.reset();
     slot.buffers.emplace(*device_, options_for(key));
     slot.forward.emplace(*device_, options_for(key));
+    if (key.mesh) slot.mesh_blend.emplace(*device_, options_for(key));
     slot.key = key;
     slot.fresh = true;
     return slot;
@@ -304,9 +337,11 @@ SplatPicture::Job SplatPicture::prepare(const Camera& camera, const DisplaySetti
     Job job{camera, {}, display, photo};
     job.splats = moving ? &some_styled(display.style, *moving) : &styled(display.style);
     job.slot = &slot_for(*job.splats, display, moving.has_value(), pane);
-    if (!display.effects.lens) job.camera.lens = {};
-    const bool is_halved =
-        display.accuracy.value(kRenderScale) < 1 && display.mode != VIEW_COUNT && !moving;
+    job.mesh = shown_mesh(display);
+    if (!display.effects.lens || job.mesh != MeshShow::none)
+        job.camera.lens = {};  // a mesh has none
+    const bool is_halved = display.accuracy.value(kRenderScale) < 1 && display.mode != VIEW_COUNT &&
+                           !moving && job.mesh != MeshShow::alone;
     job.rendered = is_halved ? halved(job.camera) : job.camera;
     compiled_ |= is_halved && !upsample_;
     if (is_halved && !upsample_) upsample_.emplace(*device_);
@@ -333,6 +368,10 @@ void SplatPicture::reserve(const Job& job) {
     if (splats > has.splats || intersections > has.intersections || pixels > has.pixels ||
         image_tiles(width, height) > has.tiles || shown > most_pixels_)
         settle();
+    if (job.mesh != MeshShow::none && !mesh_->has_room(width, height)) {
+        settle();
+        mesh_->reserve(width, height);
+    }
     most_pixels_ = std::max(most_pixels_, shown);
     buffers.reserve(splats, intersections, width, height);
 }
@@ -457,6 +496,16 @@ const SplatPicture::Image& SplatPicture::image_of(int pane) const {
 }
 
 void SplatPicture::record(const Job& job, Flight& flight) {
+    if (job.mesh != MeshShow::alone) return record_splats(job, flight);
+    const Buffer& status = job.slot->buffers->frame().counters.status;
+    flight.commands.begin();
+    record_uploads(flight);
+    flight.commands.fill(status, 0);  // it is no frame of splats
+    mesh_->record(flight.commands, job.camera, job.display, job.image->now);
+    flight.exchange.fetch(flight.commands, status);
+}
+
+void SplatPicture::record_splats(const Job& job, Flight& flight) {
     Forward& forward = *job.slot->forward;
     Frame& frame = job.slot->buffers->frame();
     const DisplaySettings& display = job.display;
@@ -471,7 +520,12 @@ void SplatPicture::record(const Job& job, Flight& flight) {
     flight.exchange.send(commands, view.camera);
     forward.record_intersections(commands, *job.splats, view, frame);
     if (depth) record_depth_colours(job, commands);
-    forward.record_blend(commands, view, frame);
+    if (job.mesh == MeshShow::both) {
+        mesh_->record(commands, job.rendered, display);
+        job.slot->mesh_blend->record(commands, job.rendered, *mesh_, display.mesh_nearer, frame);
+    } else {
+        forward.record_blend(commands, view, frame);
+    }
     const bool is_halved =
         job.rendered.width != job.camera.width || job.rendered.height != job.camera.height;
     const Buffer& image =

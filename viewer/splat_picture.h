@@ -25,6 +25,8 @@
 #include "engine/render/renderer.h"
 #include "viewer/bounds.h"
 #include "viewer/display.h"
+#include "viewer/mesh_picture.h"
+#include "viewer/surface_probe.h"
 
 namespace darb {
 
@@ -81,6 +83,17 @@ class SplatPicture {
     /// Takes over changed values of the model; the number of splats must be the same. Throws Error.
     void update_scene();
 
+    /// Shows a mesh with the scene, where the display asks for one; null: there is none any more.
+    /// Throws Error and keeps the previous one.
+    void set_mesh(const TriangleMesh* mesh);
+    bool has_mesh() const { return mesh_.has_value(); }
+
+    /// The point of the splats' surface in a pixel of the camera's picture, world; nothing where
+    /// they leave more than half of the light. It is the median depth of `darb render --depth`, of
+    /// the splats as they are, without a lens. Waits. Throws Error.
+    std::optional<glm::dvec3> surface_at(const Camera& camera, const DisplaySettings& display,
+                                         const glm::dvec2& px);
+
     /// Renders and waits. camera: at the size of the wanted frame. moving: uses the fast accuracy
     /// settings and this share of the splats, for a picture that is replaced at once. pane:
     /// pictures that take turns keep their own pipelines this way.
@@ -128,12 +141,13 @@ class SplatPicture {
         Accuracy accuracy;
         ProjectionEffects effects;
         HugeSplatPath huge_splat_path = HugeSplatPath::by_counters;
-        bool ellipsoids = false, store = false, depth = false;
+        bool ellipsoids = false, store = false, depth = false, mesh = false;
         bool operator==(const Key&) const = default;
     };
     struct Slot {
         std::optional<FrameBuffers> buffers;
         std::optional<Forward> forward;
+        std::optional<MeshBlend> mesh_blend;  // in place of forward's blend
         Key key;
         int degree = -1;  // the last picture's degree, which has a pipeline of its own
         bool fresh = true;
@@ -150,6 +164,7 @@ class SplatPicture {
         Slot* slot = nullptr;
         Image* image = nullptr;
         Pipeline* pipeline = nullptr;
+        MeshShow mesh = MeshShow::none;
     };
     struct Flight {  // what a picture under way has for itself
         explicit Flight(Device& device) : exchange(device), commands(device) {}
@@ -166,6 +181,8 @@ class SplatPicture {
     void prepare_image(Job& job, int image);
     void reserve(const Job& job);
     void record(const Job& job, Flight& flight);
+    void record_splats(const Job& job, Flight& flight);
+    MeshShow shown_mesh(const DisplaySettings& display) const;
     // Turns the splats' colours into their depths, between the two steps of a frame.
     void record_depth_colours(const Job& job, Commands& commands);
     void record_display(const Job& job, const Buffer& image, Commands& commands);
@@ -190,6 +207,8 @@ class SplatPicture {
     const GpuSplats* live_ = nullptr;
     std::optional<GpuSplats> own_, styled_, some_;  // all; all in a style; the important ones
     SplatStyle styled_as_ = SplatStyle::splats, some_as_ = SplatStyle::splats;
+    std::optional<MeshPicture> mesh_;
+    std::optional<SurfaceProbe> probe_;  // once a point of the surface was asked for
     std::vector<std::uint32_t> important_;
     std::vector<GpuSplats> levels_;  // in falling order of size
     bool levels_ended_ = false;

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "viewer/tools.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 #include <glm/gtc/matrix_transform.hpp>
+#include <utility>
 
+#include "engine/core/error.h"
 #include "viewer/controls.h"
 #include "viewer/session.h"
 #include "viewer/view_camera.h"
@@ -212,6 +216,123 @@ bool use_gizmo(const Input& in, const Camera& camera, Session& s) {
 
 }  // namespace
 
+namespace {
+
+constexpr double kPull = 4, kNearPoint = 10;  // px at gui_scale 1
+
+/// A click picks a point or takes hold of one, and a drag of a point moves it. A drag beside them
+/// belongs to the camera.
+bool use_measure(const Input& in, const ControlFrame& frame, const Camera& camera, Session& s) {
+    ToolState& t = s.tools;
+    const glm::dvec2 at(in.x, in.y);
+    if (!t.pressed) {
+        if (!in.left || frame.panels_want_mouse || in.shift) return false;
+        t.pressed = in.trail.empty() ? at : in.trail.front();
+        t.pulled = false;
+        t.held_point = measured_point_at(s, camera, *t.pressed);
+        t.drawing = true;
+    }
+    t.pulled |= glm::distance(*t.pressed, at) > kPull * s.gui_scale;
+    if (in.left) return t.held_point >= 0 || !t.pulled;
+    const int held = t.held_point;
+    const bool pulled = t.pulled, closes = held == 0 && !pulled;
+    const glm::dvec2 pressed = *t.pressed;
+    t.pressed.reset();
+    t.drawing = false;
+    t.held_point = -1;
+    if (closes)
+        close_measurement(s);
+    else if (held >= 0 && pulled)
+        s.ask(request::PickPoint{at, held});
+    else if (held < 0 && !pulled)
+        s.ask(request::PickPoint{pressed, -1});
+    return true;
+}
+
+void measure_step(Measurement next, const std::string& what, Session& s) {
+    SceneFacts facts = s.edit.facts();
+    facts.measured = std::move(next);
+    if (s.edit.state(facts, what, false) > 0) s.tools.known_side = -1;
+}
+
+}  // namespace
+
+int measured_point_at(const Session& s, const Camera& camera, const glm::dvec2& px) {
+    const std::vector<glm::dvec3>& points = s.edit.facts().measured.points;
+    int best = -1;
+    double nearest = kNearPoint * s.gui_scale;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const std::optional<glm::dvec2> at = pixel_of(camera, points[i]);
+        if (!at || glm::distance(*at, px) >= nearest) continue;
+        nearest = glm::distance(*at, px);
+        best = static_cast<int>(i);
+    }
+    return best;
+}
+
+void add_measured_point(const glm::dvec3& point, int replaces, Session& s) {
+    Measurement next = s.edit.facts().measured;
+    const bool moves = replaces >= 0 && replaces < static_cast<int>(next.points.size());
+    if (moves) {
+        next.points[static_cast<std::size_t>(replaces)] = point;
+    } else if (next.closed) {
+        next = {{point}, false};  // a closed polygon is complete
+    } else {
+        next.points.push_back(point);
+    }
+    measure_step(std::move(next), moves ? "moved a measured point" : "measured a point", s);
+}
+
+void drop_measured_point(Session& s) {
+    Measurement next = s.edit.facts().measured;
+    if (next.points.empty()) return;
+    if (!next.closed) next.points.pop_back();
+    next.closed = false;
+    measure_step(std::move(next), "took a measured point away", s);
+}
+
+void close_measurement(Session& s) {
+    Measurement next = s.edit.facts().measured;
+    if (next.points.size() < 3) return;
+    next.closed = true;
+    measure_step(std::move(next), "closed the polygon", s);
+}
+
+void clear_measurement(Session& s) {
+    measure_step({}, "cleared the measurement", s);
+}
+
+void set_known_length(int side, double metres, Session& s) {
+    const MeasuredLengths lengths = measured_lengths(s.edit.facts().measured, s.navigation.up);
+    const bool all = side < 0 || side >= static_cast<int>(lengths.sides.size());
+    const double units = all ? lengths.total : lengths.sides[static_cast<std::size_t>(side)];
+    SceneFacts facts = s.edit.facts();
+    facts.metres_per_unit = metres / units;
+    if (!(units > 0) || !std::isfinite(facts.metres_per_unit) || !(facts.metres_per_unit > 0))
+        throw Error("scale", "takes a length above 0 and two points that are apart",
+                    "Click two points whose distance you know, and type it in metres.");
+    show_edit(
+        s.edit.state(facts, fmt::format("set the scale: a unit is {:.4g} m", facts.metres_per_unit),
+                     true),
+        s);
+}
+
+void set_ground(Session& s) {
+    const std::optional<glm::dvec3> up = up_of_ground(s.edit.facts().measured, s.navigation.up);
+    if (!up)
+        throw Error("ground", "takes three points or more that are on no line",
+                    "Click three points on the ground, far apart.");
+    s.edit.note_up(s.navigation.up);
+    SceneFacts facts = s.edit.facts();
+    facts.up = *up;
+    facts.ground = true;
+    if (s.edit.state(facts, "set the ground: it is saved level", true) == 0) return;
+    leave_photo(s);
+    s.navigation.set_up(*up);
+    s.navigation.level();
+    show_edit(1, s);
+}
+
 double drawn_radius(const Session& s, const Camera& camera) {
     const ToolState& t = s.tools;
     if (!t.sphere || t.stroke.empty()) return 0;
@@ -243,6 +364,7 @@ bool use_tool(const Input& in, const ControlFrame& frame, Session& s) {
     if (has_gizmo(t.tool) && !t.drawing) find_centre(s);
     if (!t.drawing && (frame.panels_want_mouse || !in.left)) return false;
     const Camera camera = camera_of(s, frame);
+    if (t.tool == Tool::measure) return use_measure(in, frame, camera, s);
     if (has_gizmo(t.tool)) return use_gizmo(in, camera, s);
     if (!t.drawing) {
         begin_stroke(in, camera, s);
@@ -259,6 +381,8 @@ void choose_tool(Tool tool, Session& s) {
     s.tools.drawing = false;
     s.tools.stroke.clear();
     s.tools.handle.reset();
+    s.tools.pressed.reset();
+    s.tools.held_point = -1;
     s.tools.tool = tool;
 }
 
@@ -288,16 +412,29 @@ void show_step(const std::string& what, const char* said, Session& s) {
     s.ask(request::ShowEdits{});
 }
 
+// before: the facts' up before a step was undone or redone.
+void follow_up(const std::optional<glm::dvec3>& before, Session& s) {
+    const std::optional<glm::dvec3>& up = s.edit.facts().up;
+    if (!up || up == before) return;
+    leave_photo(s);
+    s.navigation.set_up(*up);
+    s.navigation.level();
+}
+
 }  // namespace
 
 void undo_edit(Session& s) {
     if (!s.scene || s.edit.transforms()) return;
+    const std::optional<glm::dvec3> up = s.edit.facts().up;
     show_step(s.edit.undo(s.scene->model), "undone: ", s);
+    follow_up(up, s);
 }
 
 void redo_edit(Session& s) {
     if (!s.scene || s.edit.transforms()) return;
+    const std::optional<glm::dvec3> up = s.edit.facts().up;
     show_step(s.edit.redo(s.scene->model), "redone: ", s);
+    follow_up(up, s);
 }
 
 }  // namespace darb

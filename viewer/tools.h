@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Tools: what the left button does to the splats while a tool is chosen. A stroke selects, and a
-// gizmo moves, turns and scales the selection.
+// Tools: what the left button does to the splats while a tool is chosen. A stroke selects, a gizmo
+// moves, turns and scales the selection, and clicks measure.
 #pragma once
 
 #include <array>
@@ -41,8 +41,8 @@ struct Session;
 struct Input;
 struct ControlFrame;
 
-enum class Tool { navigate, rectangle, lasso, brush, sphere, move, turn, scale };
-inline constexpr int kToolCount = 8;
+enum class Tool { navigate, rectangle, lasso, brush, sphere, move, turn, scale, measure };
+inline constexpr int kToolCount = 9;
 
 /// How often values occur, for the ranges that one drags.
 struct ValueHistograms {
@@ -73,6 +73,12 @@ struct ToolState {
     // least size in times of the median, the least count of photos.
     float isolated = 0.01f, haze_opacity = 0.1f, haze_size = 5;
     int looked_through = 3;
+    // Of measuring: where the button went down and whether the pointer has left that place, which
+    // measured point it is on, and which side of the measurement has its true length typed.
+    std::optional<glm::dvec2> pressed;
+    bool pulled = false;
+    int held_point = -1, known_side = -1;  // known_side -1: the whole line
+    double known_metres = 1;
     ValueHistograms histograms;
     glm::vec3 colour{1.0f};
     float tolerance = 0.1f, grow = 0.01f;  // grow: world units
@@ -86,6 +92,18 @@ void choose_tool(Tool tool, Session& session);
 /// Drops the stroke that is being drawn and takes back a move under way. Returns whether there was
 /// any.
 bool cancel_stroke(Session& session);
+/// The measured point within 10 px of the pixel at gui_scale 1; -1: none.
+int measured_point_at(const Session& session, const Camera& camera, const glm::dvec2& px);
+/// Steps of measuring: adds a point, or moves one; takes the last away; joins the last to the
+/// first; begins anew.
+void add_measured_point(const glm::dvec3& point, int replaces, Session& session);
+void drop_measured_point(Session& session);
+void close_measurement(Session& session);
+void clear_measurement(Session& session);
+/// A side of the measurement (-1: all of them) has this length, m: then every length is known.
+void set_known_length(int side, double metres, Session& session);
+/// Makes the measured points lie on level ground.
+void set_ground(Session& session);
 /// Edits by keys and buttons; each reports what it did and asks for the picture.
 void show_edit(std::size_t changed, Session& session);
 void undo_edit(Session& session);

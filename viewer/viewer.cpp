@@ -77,6 +77,7 @@ void Viewer::finish_loading() {
     }
     if (std::optional<LoadedScene> loaded = document_.take_loaded(true))
         controller_.show(std::move(*loaded));
+    painter_.finish_mesh();
 }
 
 void Viewer::show_live(LivePicture& pictures, const Bounds& bounds, const LiveScene& scene) {

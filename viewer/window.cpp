@@ -52,7 +52,7 @@ std::optional<Key> key_for(int key, bool control) {
             default:
                 return {};
         }
-    if (key >= GLFW_KEY_1 && key <= GLFW_KEY_8)
+    if (key >= GLFW_KEY_1 && key <= GLFW_KEY_9)
         return static_cast<Key>(static_cast<int>(Key::tool_navigate) + key - GLFW_KEY_1);
     switch (key) {
         case GLFW_KEY_F:

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
@@ -85,6 +86,12 @@ nlohmann::json parse_json_text(std::string_view text, const std::string& where,
                                  printable(reason.substr(quote + 1, kShown)));
         throw Error(where, reason, hint);
     }
+}
+
+double positive_number(const nlohmann::json& object, const char* key) {
+    if (!object.is_object() || !object.contains(key) || !object[key].is_number()) return 0;
+    const double value = object[key].get<double>();
+    return std::isfinite(value) && value > 0 ? value : 0;
 }
 
 }  // namespace darb

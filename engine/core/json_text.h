@@ -19,4 +19,7 @@ std::string json_fault(std::string_view text, const nlohmann::json::parse_error&
 /// A library error in words for users: which key is missing, or which value has the wrong type.
 std::string json_reason(const nlohmann::json::exception& error);
 
+/// object[key] where that is a finite number above 0; else 0, also where `object` is no object.
+double positive_number(const nlohmann::json& object, const char* key);
+
 }  // namespace darb

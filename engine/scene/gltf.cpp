@@ -656,6 +656,8 @@ SplatModel read_placed(GltfScene& scene, const PlacedSplats& placed,
     } else {
         read_fallback(scene, attributes, model);
     }
+    model.metres_per_unit =
+        positive_number(placed.primitive.value("extras", json()), "metresPerUnit");
     if (glm::dmat3(placed.to_world) != glm::dmat3(1.0))
         transform_splats(similarity_of(scene, placed.to_world), model);
     else
@@ -745,14 +747,14 @@ bool is_gltf(const SplatSource& source) {
 }  // namespace
 
 const SplatFormatRow& gltf_format() {
-    static const SplatFormatRow row{
-        .name = "glTF",
-        .endings = {".glb", ".gltf"},
-        .recognise = is_gltf,
-        .parse = load_gltf,
-        .encode = gltf::encode,
-        .keeps = kKeepsKernel | kKeepsRenderMode | kKeepsHarmonics | kKeepsDoublePositions,
-        .cuts = gltf::fallback_losses};
+    static const SplatFormatRow row{.name = "glTF",
+                                    .endings = {".glb", ".gltf"},
+                                    .recognise = is_gltf,
+                                    .parse = load_gltf,
+                                    .encode = gltf::encode,
+                                    .keeps = kKeepsKernel | kKeepsRenderMode | kKeepsHarmonics |
+                                             kKeepsDoublePositions | kKeepsUnit,
+                                    .cuts = gltf::fallback_losses};
     return row;
 }
 
@@ -835,8 +837,8 @@ json document_of(const SplatModel& model, Writer& to) {
     }
     json node = node_at(model.origin);
     node["mesh"] = 0;
-    const json primitive = {
-        {"attributes", attributes}, {"mode", 0}, {"extensions", {{kSplats, splats}}}};
+    json primitive = {{"attributes", attributes}, {"mode", 0}, {"extensions", {{kSplats, splats}}}};
+    if (model.metres_per_unit > 0) primitive["extras"] = {{"metresPerUnit", model.metres_per_unit}};
     return {
         {"extensionsUsed", used}, {"nodes", {node}}, {"meshes", {{{"primitives", {primitive}}}}}};
 }

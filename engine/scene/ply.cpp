@@ -13,6 +13,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/text.h"
 #include "engine/kernels/kernel_coefficients.h"
 #include "engine/kernels/kernel_definition.h"
@@ -269,7 +270,7 @@ const SplatFormatRow& ply_format() {
         .encode = [](const SplatModel& model, const std::string&,
                      const EncodeOptions&) { return EncodedSplats{encode_ply(model)}; },
         .keeps = kKeepsKernel | kKeepsRenderMode | kKeepsHarmonics | kKeepsDoublePositions |
-                 kKeepsUnturned | kKeepsShape,
+                 kKeepsUnturned | kKeepsShape | kKeepsUnit,
         .cuts = ply_losses};
     return row;
 }
@@ -333,6 +334,19 @@ void read_render_mode(const PlyHeader& header, SplatModel& model, std::vector<st
             fmt::format("the SplatRenderMode '{}' is not known: drawn as default", mode));
 }
 
+void read_unit(const PlyHeader& header, SplatModel& model, std::vector<std::string>& notes) {
+    const std::string_view text = last_value(header, "SplatMetresPerUnit");
+    if (text.empty()) return;
+    double value = 0;
+    const auto [end, error] = parse_number(text.data(), text.data() + text.size(), value);
+    const bool whole = error == std::errc{} && end == text.data() + text.size();
+    if (whole && std::isfinite(value) && value > 0)
+        model.metres_per_unit = value;
+    else
+        notes.push_back(fmt::format("the SplatMetresPerUnit '{}' is no length: left out",
+                                    printable(text.substr(0, 40))));
+}
+
 }  // namespace
 
 void read_ply_comments(const PlyHeader& header, const std::string& where, SplatModel& model,
@@ -360,6 +374,7 @@ void read_ply_comments(const PlyHeader& header, const std::string& where, SplatM
                                 kernel_name(model.kernel)),
                     "Correct the comment to psi, or remove it.");
     read_render_mode(header, model, notes);
+    read_unit(header, model, notes);
     if (stated_up(header) == "z")
         notes.emplace_back(
             "its comment 'Vertical axis: z' says what is up: darb view follows it, --up z of darb "
@@ -371,10 +386,14 @@ std::string stated_up(const PlyHeader& header) {
 }
 
 std::string ply_comments(const SplatModel& model) {
+    const std::string unit =
+        model.metres_per_unit > 0
+            ? fmt::format("comment SplatMetresPerUnit: {}\n", model.metres_per_unit)
+            : "";
     return fmt::format(
-        "comment SplatKernel: {}\ncomment SplatFootprint: {}\ncomment SplatRenderMode: {}\n{}",
+        "comment SplatKernel: {}\ncomment SplatFootprint: {}\ncomment SplatRenderMode: {}\n{}{}",
         kernel_name(model.kernel), footprint_name(model.footprint),
-        model.antialias ? "mip" : "default", function_comments(model));
+        model.antialias ? "mip" : "default", unit, function_comments(model));
 }
 
 namespace {

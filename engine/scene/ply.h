@@ -47,8 +47,9 @@ void write_ply(const std::filesystem::path& path, const SplatModel& model);
 std::vector<std::byte> encode_ply(const SplatModel& model);
 
 // The header comments of splat PLY files, plain and compressed: SplatKernel, SplatFootprint and
-// SplatRenderMode (default or mip; Postshot writes "antialiased 0" or 1). The last comment of a
-// kind counts; keys and render modes are read in any case. A user's own kernel also has
+// SplatRenderMode (default or mip; Postshot writes "antialiased 0" or 1), and SplatMetresPerUnit
+// where the scale is known. The last comment of a kind counts; keys and render modes are read in
+// any case. A user's own kernel also has
 // SplatKernelFunction, the "function" of engine/kernels/kernel_definition.h, and
 // SplatKernelPolynomial for other programs.
 

@@ -243,6 +243,7 @@ SplatModel decode(const json& meta, const SogPart& part, const std::string& wher
                     kCopyAgain);
     check_expansion(stored, scene.count * kSplatBytes, where);
     scene.model.antialias = is_antialiased(meta);
+    scene.model.metres_per_unit = positive_number(meta, "metresPerUnit");
     scene.model.resize(scene.count);
     if (scene.count > 0) {
         read_means(scene);
@@ -322,7 +323,7 @@ const SplatFormatRow& sog_format() {
                                     .recognise = is_sog,
                                     .parse = load_sog,
                                     .encode = encode_sog,
-                                    .keeps = kKeepsRenderMode | kKeepsHarmonics};
+                                    .keeps = kKeepsRenderMode | kKeepsHarmonics | kKeepsUnit};
     return row;
 }
 
@@ -663,6 +664,7 @@ EncodedSplats encode_sog_parts(const SplatModel& scene, const std::string& where
                  {"asset", {{"generator", "darb " DARB_VERSION}}},
                  {"count", model.size()},
                  {"antialias", model.antialias}};
+    if (model.metres_per_unit > 0) meta["metresPerUnit"] = model.metres_per_unit;
     std::vector<Plane> planes;
     write_means(model, meta, planes);
     write_quats(model, meta, planes);

@@ -90,6 +90,9 @@ std::vector<std::string> missing_places(const SplatFormatRow& row, const SplatMo
     if (!(row.keeps & kKeepsHarmonics) && model.sh_degree > 0)
         losses.push_back(fmt::format("{} has no place for harmonics: degree {} becomes 0", row.name,
                                      model.sh_degree));
+    if (!(row.keeps & kKeepsUnit) && model.metres_per_unit > 0)
+        losses.push_back(fmt::format("{} has no place for the scale (a unit is {:.4g} m)", row.name,
+                                     model.metres_per_unit));
     return losses;
 }
 

@@ -31,6 +31,7 @@ enum SplatFeature : unsigned {
     kKeepsDoublePositions = 8,  // or `cuts` says what happens to them
     kKeepsUnturned = 16,        // splats without a rotation, which are never drawn
     kKeepsShape = 32,           // one per splat; other formats refuse kernels with shapes
+    kKeepsUnit = 64,            // metres_per_unit
 };
 
 struct SplatFormatRow {

@@ -135,8 +135,9 @@ struct SplatModel : SplatArrays<float> {
     int sh_degree = 0;             // 0..3
     int kernel = KERNEL_GAUSSIAN;  // shaders/shared/kernel_list.h
     Footprint footprint = Footprint::psi;
-    bool antialias = false;  // SplatRenderMode: mip
-    glm::dvec3 origin{0.0};  // added to every position on save; positions are relative to it
+    bool antialias = false;      // SplatRenderMode: mip
+    glm::dvec3 origin{0.0};      // added to every position on save; positions are relative to it
+    double metres_per_unit = 0;  // how long a world unit is; 0: not known
 
     size_t size() const { return opacity_logit.size(); }
     int rest_count() const { return static_cast<int>(attribute_floats(kShRest, sh_degree)); }

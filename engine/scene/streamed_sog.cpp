@@ -166,6 +166,7 @@ SplatModel load_level(const SplatSource& source, SplatFile& file,
     for (const auto& [index, chunk] : chunks) {
         model.sh_degree = std::max(model.sh_degree, chunk.sh_degree);
         model.antialias = chunk.antialias;
+        model.metres_per_unit = chunk.metres_per_unit;
     }
     std::vector<double> positions;
     for (const LodRange& range : ranges) {
@@ -378,7 +379,7 @@ const SplatFormatRow& streamed_sog_format() {
                                         },
                                     .parse = load_streamed,
                                     .encode = encode_streamed,
-                                    .keeps = kKeepsRenderMode | kKeepsHarmonics};
+                                    .keeps = kKeepsRenderMode | kKeepsHarmonics | kKeepsUnit};
     return row;
 }
 

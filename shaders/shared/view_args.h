@@ -14,6 +14,16 @@
 #define VIEW_DEPTH 2
 #define VIEW_COUNT 3  // intersections of the tile's list that the pixel walked through, as heat
 
+// What mesh_shade.comp shows of a mesh.
+#define MESH_COLOURS 0  // the colours of its vertices, or its shape where it has none
+#define MESH_SHAPE 1    // grey, by the slope of each face
+#define MESH_EDGES 2    // the same with the edges of the faces
+
+// A face over more pixels than this is drawn by MESH_PARTS workgroups, not by one thread.
+#define MESH_SMALL 1024u
+#define MESH_LARGE_GROUPS 64u  // workgroups that share all large faces, each for a part
+#define MESH_PARTS 8u
+
 #ifdef __cplusplus
 namespace darb::gpu {
 #endif
@@ -45,7 +55,33 @@ struct PaneArgs {
     float heat_max;      // value that gets the hottest colour
 };
 
+// mesh_raster, mesh_raster_large, mesh_shade: a triangle mesh seen by a pinhole.
+struct MeshDrawArgs {
+    vec3 row0, row1, row2;  // of the turn from the mesh's frame to the camera's
+    vec3 shift;             // added then
+    vec2 focal;             // px
+    vec2 principal;         // px
+    uint width, height;     // px
+    float near_plane;       // world units along z
+    uint faces;
+    uint step;         // rasters: 0 for depths, 1 for the faces that have them
+    uint look;         // mesh_shade: MESH_COLOURS, MESH_SHAPE or MESH_EDGES
+    uint has_colours;  // 1: of vertices
+    float background_r, background_g, background_b;
+};
+
+// mesh_blend: splats before the surface of a mesh.
+struct MeshBlendArgs {
+    uint width, height;  // px
+    uint tiles_x;
+    float nearer;   // share of the depth by which the mesh counts as nearer
+    uint segment;   // which segment of every list this dispatch takes, where SEGMENT > 0
+    uint segments;  // how many segments there are
+};
+
 #ifdef __cplusplus
+static_assert(sizeof(MeshDrawArgs) == 104);
+static_assert(sizeof(MeshBlendArgs) == 24);
 static_assert(sizeof(DisplayArgs) == 56);
 static_assert(sizeof(PaneArgs) == 24);
 static_assert(sizeof(DepthLightArgs) == 12);

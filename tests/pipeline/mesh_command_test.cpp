@@ -123,6 +123,50 @@ TEST(MeshCommand, Has_the_same_bits_again_and_within_less_memory) {
     EXPECT_EQ(bytes, read_file(scratch_file("ranges.ply")));
 }
 
+TEST(MeshCommand, Says_lengths_in_metres_once_the_scale_is_known) {
+    SplatModel ball = load_splats(ball_file());
+    const std::string scaled = scratch_file("scaled.ply"), report = scratch_file("scaled.json");
+    const auto mesh = [&] {
+        write_ply(scaled, ball);
+        return darb(fmt::format("mesh '{}' --cameras '{}' --voxel 0.2 -o '{}' --json {} --force",
+                                scaled, cameras_file(), scratch_file("scaled.obj"), report));
+    };
+    const Outcome plain = mesh();
+    ASSERT_EQ(plain.code, 0) << plain.err;
+    EXPECT_EQ(plain.out.find(" m)"), std::string::npos) << plain.out;
+    EXPECT_FALSE(read_json(report).contains("metres_per_unit"));
+    ball.metres_per_unit = 2.5;
+    const Outcome o = mesh();
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("voxel 0.2 (0.5 m)"), std::string::npos) << o.out;
+    EXPECT_EQ(read_json(report)["metres_per_unit"], 2.5);
+    const Outcome info = darb("info '" + scaled + "'");
+    EXPECT_NE(info.out.find("unit         2.5 m"), std::string::npos) << info.out;
+}
+
+#ifdef DARB_HAS_VIEWER
+TEST(MeshCommand, Is_shown_by_view_and_what_is_no_mesh_is_refused) {
+    const std::string scene = ball_file().string(), picture = scratch_file("shown.png");
+    ASSERT_EQ(darb(mesh_of("shown.glb")).code, 0);
+    const std::string view = fmt::format(
+        "view '{}' --size 64x48 --no-panels --force --screenshot "
+        "'{}' --mesh ",
+        scene, picture);
+    const Outcome plain = darb(view + scratch_file("shown.glb") + " --mesh-show alone");
+    ASSERT_EQ(plain.code, 0) << plain.err;
+    const ImageU8 coloured = read_image(picture);
+    ASSERT_EQ(darb(view + scratch_file("shown.glb") + " --mesh-show alone --mesh-as shape").code,
+              0);
+    EXPECT_NE(read_image(picture).data, coloured.data);
+    write_file_atomic(scratch_file("note.txt"), "a text");
+    for (const std::string& other : {scene, scratch_file("note.txt"), scratch_file("none.glb")}) {
+        const Outcome o = darb(view + other);
+        EXPECT_EQ(o.code, 2) << o.err;
+        EXPECT_NE(o.err.find(fs::path(other).filename().string()), std::string::npos) << o.err;
+    }
+}
+#endif
+
 // Rings rise again along a ray, so the default is another reading there.
 TEST(MeshCommand, Reads_kernels_with_rings_by_their_planes) {
     SplatModel ball = load_splats(ball_file());

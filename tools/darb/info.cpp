@@ -50,9 +50,10 @@ nlohmann::json dataset_info(const std::filesystem::path& path, const DatasetOpti
 /// Reads any splat file. Keys: path, format, version (null where the format has none), details,
 /// bytes, splats, dropped, notes (of the reader), kernel, footprint, render_mode, sh_degree,
 /// origin; bounds and inner_bounds (1st to 99th percentile by axis) {low, high}, world; scale (the
-/// largest standard deviation of a splat, world), opacity and, for a kernel with shapes, exponent
-/// (as drawn) {p1, p10, p50, p90, p99}; zero_rotations, huge, needles, saturated, invisible
-/// (counts); warnings (sentences). Throws Error for other files. O(N).
+/// largest standard deviation of a splat, world), metres_per_unit where it is known, opacity and,
+/// for a kernel with shapes, exponent (as drawn) {p1, p10, p50, p90, p99}; zero_rotations, huge,
+/// needles, saturated, invisible (counts); warnings (sentences). Throws Error for other files.
+/// O(N).
 nlohmann::json scene_info(const std::filesystem::path& path, const StoredUnits& units = {});
 
 namespace {
@@ -153,6 +154,8 @@ void print_scene_info(const json& info) {
                     info["footprint"].get<std::string>(), info["render_mode"].get<std::string>()));
     row("SH degree", fmt::format("{}", info["sh_degree"].get<int>()));
     row("origin", vector_text(info["origin"]));
+    if (info.contains("metres_per_unit"))
+        row("unit", fmt::format("{:.6g} m", info["metres_per_unit"].get<double>()));
     row("bounds", bounds_text(info["bounds"]));
     row("98 % within", bounds_text(info["inner_bounds"]));
     row("scale", percentiles_text(info["scale"]));
@@ -350,6 +353,7 @@ json scene_info(const std::filesystem::path& path, const StoredUnits& units) {
                  {"origin", {model.origin.x, model.origin.y, model.origin.z}},
                  {"bounds", bounds(model, 0, 1)},
                  {"inner_bounds", bounds(model, 0.01, 0.99)}};
+    if (model.metres_per_unit > 0) info["metres_per_unit"] = model.metres_per_unit;
     add_splats(model, info);
     add_warnings(info);
     return info;

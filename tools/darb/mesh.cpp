@@ -231,7 +231,8 @@ std::string alignment_text(const Alignment& a) {
         a.degrees, a.moved, a.scale, a.before, a.after);
 }
 
-nlohmann::json report_json(const MeshFlags& flags, const SceneMesh& result) {
+nlohmann::json report_json(const MeshFlags& flags, const SceneMesh& result,
+                           double metres_per_unit) {
     const SceneMeshReport& r = result.report;
     nlohmann::json json{{"output", name_in_json(flags.json, flags.output)},
                         {"vertices", result.mesh.vertex_count()},
@@ -252,6 +253,7 @@ nlohmann::json report_json(const MeshFlags& flags, const SceneMesh& result) {
                         {"parts_removed", r.clean.parts_removed},
                         {"holes_filled", r.clean.holes_filled},
                         {"holes_left", r.clean.holes_left}};
+    if (metres_per_unit > 0) json["metres_per_unit"] = metres_per_unit;
     if (r.simplified_by) json["simplified_by"] = *r.simplified_by;
     if (r.texture) {
         json["texture"] = {
@@ -264,22 +266,27 @@ nlohmann::json report_json(const MeshFlags& flags, const SceneMesh& result) {
     return json;
 }
 
-std::string report_text(const MeshFlags& flags, const SceneMesh& result) {
+std::string report_text(const MeshFlags& flags, const SceneMesh& result, double metres_per_unit) {
     const SceneMeshReport& r = result.report;
+    const auto length = [&](double units) {
+        return metres_per_unit > 0
+                   ? fmt::format("{:.4g} ({:.4g} m)", units, units * metres_per_unit)
+                   : fmt::format("{:.4g}", units);
+    };
     std::string text = fmt::format(
         "{} views: {:.0f} % of the pixels show a surface, other views confirm {:.0f} % of those\n"
-        "voxel {:.4g}, {} blocks of {} voxels in {} range{}, depths up to {:.4g}\n"
+        "voxel {}, {} blocks of {} voxels in {} range{}, depths up to {}\n"
         "cleaned: {} of {} parts removed, {} holes filled\n",
         r.views, 100 * share(r.depths.surfaces, r.depths.pixels),
-        100 * share(r.depths.kept, r.depths.surfaces), r.tsdf.voxel, r.tsdf.blocks, BLOCK_VOXELS,
-        r.tsdf.ranges, r.tsdf.ranges == 1 ? "" : "s", r.tsdf.farthest, r.clean.parts_removed,
-        r.clean.parts, r.clean.holes_filled);
+        100 * share(r.depths.kept, r.depths.surfaces), length(r.tsdf.voxel), r.tsdf.blocks,
+        BLOCK_VOXELS, r.tsdf.ranges, r.tsdf.ranges == 1 ? "" : "s", length(r.tsdf.farthest),
+        r.clean.parts_removed, r.clean.parts, r.clean.holes_filled);
     if (r.simplified_by)
-        text +=
-            fmt::format("simplified: the full surface is at most {:.4g} away\n", *r.simplified_by);
+        text += fmt::format("simplified: the full surface is at most {} away\n",
+                            length(*r.simplified_by));
     if (r.texture)
-        text += fmt::format("texture: {} page{} with texels of {:.4g}", r.texture->pages,
-                            r.texture->pages == 1 ? "" : "s", r.texture->texel);
+        text += fmt::format("texture: {} page{} with texels of {}", r.texture->pages,
+                            r.texture->pages == 1 ? "" : "s", length(r.texture->texel));
     if (r.texture && flags.mesh.texture == MeshTexturing::photos)
         text += fmt::format("; {:.1f} % of the faces are in no photo and have the splats' colours",
                             100 * share(r.texture->unseen_faces, result.mesh.face_count()));
@@ -346,7 +353,10 @@ MeshResult make_surface(const MeshFlags& flags, const MeshProgress& progress) {
         mesh_scene(device, model, views, f.mesh, photos ? &*photos : nullptr, progress);
     note_thin_parts(made.report.thin_share);
     note_faces_left(made.mesh.face_count(), f.mesh.faces);
-    MeshResult result{{}, {}, report_json(f, made), report_text(f, made)};
+    MeshResult result{{},
+                      {},
+                      report_json(f, made, model.metres_per_unit),
+                      report_text(f, made, model.metres_per_unit)};
     if (!f.reference.path.empty()) {
         progress("comparison", 0);
         const ReferenceComparison found = compare_with_reference(made, f.reference);

@@ -155,12 +155,14 @@ int view(ViewFlags flags) {
     options.accuracy = chosen_accuracy(flags.accuracy);
     options.effects = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     if (!flags.up.empty()) up_from_name(flags.up);
-    refuse_to_overwrite_inputs(
-        {flags.screenshot, flags.times},
-        together({files_of(flags.scene), files_of(flags.cameras), files_of(flags.path)}));
+    refuse_to_overwrite_inputs({flags.screenshot, flags.times},
+                               together({files_of(flags.scene), files_of(flags.cameras),
+                                         files_of(flags.path), files_of(flags.mesh)}));
     refuse_other_pictures(flags.screenshot);
     if (!flags.scene.empty())
         check_scene_file(find_scene(flags.scene));  // reports an error before a window opens
+    if (!flags.mesh.empty()) check_mesh_file(flags.mesh);
+    options.mesh = flags.mesh;
     std::string note;
     options.views = find_views(flags, note);
     refuse_to_overwrite_inputs({flags.screenshot, flags.times}, files_of(options.views));
@@ -232,6 +234,12 @@ void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size) 
     s.display.mode = choice(flags.show, {"picture", "error", "depth", "work"});
     s.display.style =
         static_cast<SplatStyle>(choice(flags.style, {"splats", "points", "ellipsoids"}));
+    if (!flags.mesh.empty()) {
+        s.display.mesh =
+            static_cast<MeshShow>(1 + choice(flags.mesh_show, {"alone", "both", "beside"}));
+        s.display.mesh_look =
+            static_cast<MeshLook>(choice(flags.mesh_look, {"colours", "shape", "edges"}));
+    }
     if (flags.white_background) s.display.background = glm::vec3(1.0f);
     s.panels = !flags.no_panels;
     s.path.export_width = size.width;
@@ -287,6 +295,19 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
         ->capture_default_str();
     c.add_option("--splats-as", flags.style, "how splats are drawn")
         ->check(CLI::IsMember({"splats", "points", "ellipsoids"}))
+        ->capture_default_str();
+    c.add_option(
+         "--mesh", flags.mesh,
+         "a mesh to show with the scene, such as darb mesh writes: .ply, .obj, .glb or .gltf")
+        ->needs(c.get_option("scene"));
+    c.add_option("--mesh-show", flags.mesh_show,
+                 "alone, both where each hides what is behind it, or beside the splats")
+        ->check(CLI::IsMember({"alone", "both", "beside"}))
+        ->needs(c.get_option("--mesh"))
+        ->capture_default_str();
+    c.add_option("--mesh-as", flags.mesh_look, "how the mesh is drawn; edges: its shape with those")
+        ->check(CLI::IsMember({"colours", "shape", "edges"}))
+        ->needs(c.get_option("--mesh"))
         ->capture_default_str();
     c.add_flag("--compare", flags.compare,
                "show the photo beside the picture, at a camera of the data set");
@@ -483,7 +504,9 @@ int view_in_window(const ViewFlags& flags, const ViewerOptions& options, const P
     windows.require(device_options);
     Device device(device_options);
     settle_tuning(device, flags.tune);
-    ViewerWindow window(device, options, size.width, size.height);
+    ViewerOptions with_device = options;
+    with_device.second_device = device_options;
+    ViewerWindow window(device, with_device, size.width, size.height);
     apply_flags(window.viewer(), flags, size);
     if (!note.empty()) window.viewer().session().tell(note);
     if (!flags.scene.empty()) {

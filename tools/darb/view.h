@@ -14,8 +14,9 @@
 namespace darb {
 
 struct ViewFlags {
-    std::filesystem::path scene, cameras, screenshot, path, frames, times;
+    std::filesystem::path scene, cameras, screenshot, path, frames, times, mesh;
     std::string device, up, beside, size = "1280x720", show = "picture", style = "splats";
+    std::string mesh_show = "both", mesh_look = "colours";
     int camera = -1, fps = 30;
     float gui_scale = 0;  // size of the panels; 0: the display's
     bool white_background = false, compare = false, difference = false, no_panels = false,

@@ -70,8 +70,8 @@ void draw_sphere(const Camera& camera, const Region& r) {
 }
 
 void tool_choice(Session& s) {
-    constexpr const char* kNames[kToolCount] = {"orbit",  "rectangle", "lasso", "brush",
-                                                "sphere", "move",      "turn",  "scale"};
+    constexpr const char* kNames[kToolCount] = {"orbit", "rectangle", "lasso", "brush",  "sphere",
+                                                "move",  "turn",      "scale", "measure"};
     constexpr float kColumns[] = {0, 88, 186, 262};  // px at scale 1
     constexpr const char* kTips[kToolCount] = {
         "Drag with the left button to orbit (1)",
@@ -81,7 +81,8 @@ void tool_choice(Session& s) {
         "Select around the splat where the drag begins; Shift adds, Ctrl takes away (5)",
         "Drag an arrow to move the selection, or everything if nothing is selected (6)",
         "Drag a ring to turn the selection, together with its harmonics (7)",
-        "Drag the ring to scale the selection (8)"};
+        "Drag the ring to scale the selection (8)",
+        "Click points of the surface to measure between them; see the section Measure (9)"};
     for (int i = 0; i < kToolCount; ++i) {
         if (i % 4 != 0) ImGui::SameLine(kColumns[i % 4] * s.gui_scale);
         if (ImGui::RadioButton(kNames[i], static_cast<int>(s.tools.tool) == i))

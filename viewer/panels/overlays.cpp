@@ -25,6 +25,7 @@ std::vector<std::string> pane_names(const Session& s) {
     names.emplace_back(kernel_name(s.display.kernel));
     for (const int kernel : kernels_beside(s.panes, s.display.kernel))
         names.emplace_back(kernel_name(kernel));
+    if (s.mesh && s.display.mesh == MeshShow::beside) names.emplace_back("mesh");
     return names;
 }
 
@@ -32,7 +33,8 @@ std::string pane_label(const Session& s, const std::vector<std::string>& names, 
     std::string text = names[pane];
     if (pane == 0) return text;
     if (s.panes.difference) text += ", error";
-    if (pane > s.panes.psnr_db.size() || s.display.mode != VIEW_COLOUR) return text;
+    const bool is_mesh = s.mesh && s.display.mesh == MeshShow::beside && pane + 1 == names.size();
+    if (pane > s.panes.psnr_db.size() || s.display.mode != VIEW_COLOUR || is_mesh) return text;
     const double db = s.panes.psnr_db[pane - 1];
     if (std::isnan(db)) return text;
     char number[32];
@@ -143,7 +145,8 @@ void panes_panel(Session& s) {
     }
     const std::vector<std::string> names = pane_names(s);
     for (size_t i = 0; i < s.panes.psnr_db.size() && i + 1 < names.size(); ++i)
-        ImGui::TextUnformatted(pane_label(s, names, i + 1).c_str());
+        if (const std::string label = pane_label(s, names, i + 1); label != names[i + 1])
+            ImGui::TextUnformatted(label.c_str());
 }
 
 // What lies over the picture: the stroke that selects, the gizmo, and toasts that report what
@@ -229,8 +232,10 @@ void draw_toasts(const Session& s) {
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     const float gap = kToastGap * s.gui_scale, left = panel_width(s);
     const float wrap = std::max(200.0f, std::min(size.x - left - 4 * gap, 620 * s.gui_scale));
-    float bottom = size.y - 4 * gap -
-                   (s.progress.load >= 0 || s.progress.exporting >= 0 ? 60 * s.gui_scale : 0);
+    float bottom =
+        size.y - 4 * gap -
+        (std::max({s.progress.load, s.progress.exporting, s.progress.mesh}) >= 0 ? 60 * s.gui_scale
+                                                                                 : 0);
     ImDrawList& list = *ImGui::GetForegroundDrawList();
     int shown = 0;
     for (auto toast = s.toasts.rbegin(); toast != s.toasts.rend() && shown < kToastsShown;

@@ -22,16 +22,17 @@ constexpr double kLeastFree = 0.4;
 
 void progress_window(Session& s, float width, float height) {
     const WorkProgress& p = s.progress;
-    if (std::max({p.load, p.exporting, p.measuring, p.searching}) < 0) return;
+    if (std::max({p.load, p.exporting, p.measuring, p.searching, p.mesh}) < 0) return;
     ImGui::SetNextWindowPos(ImVec2(width / 2, height - 20), 0, ImVec2(0.5f, 1));
     ImGui::Begin("progress", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
     const bool loads = p.load >= 0;
-    const auto [text, share] = loads              ? std::pair(p.load_stage.c_str(), p.load)
-                               : p.exporting >= 0 ? std::pair("exporting frames", p.exporting)
-                               : p.measuring >= 0
-                                   ? std::pair("measuring settings and effects", p.measuring)
-                                   : std::pair("looking for splats in free space", p.searching);
+    const auto [text, share] =
+        loads              ? std::pair(p.load_stage.c_str(), p.load)
+        : p.exporting >= 0 ? std::pair("exporting frames", p.exporting)
+        : p.measuring >= 0 ? std::pair("measuring settings and effects", p.measuring)
+        : p.searching >= 0 ? std::pair("looking for splats in free space", p.searching)
+                           : std::pair(p.mesh_stage.c_str(), p.mesh);
     ImGui::TextUnformatted(text);
     ImGui::ProgressBar(static_cast<float>(share), ImVec2(kWidth * s.gui_scale, 0));
     ImGui::SameLine();
@@ -65,15 +66,22 @@ void leaving_window(Session& s, float width, float height) {
     ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), 0, ImVec2(0.5f, 0.5f));
     ImGui::Begin("Not saved", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
-    ImGui::TextUnformatted("The edits of this scene have not been saved.");
-    path_field("file", s.save_file);
-    tip("The ending of the name decides the format");
+    if (unsaved_edits(s)) {
+        ImGui::TextUnformatted("The edits of this scene have not been saved.");
+        path_field("file", s.save_file);
+        tip("The ending of the name decides the format");
+    }
+    if (unsaved_mesh(s)) {
+        ImGui::TextUnformatted("The mesh that was made has not been saved.");
+        path_field("mesh file", s.mesh_file);
+        tip("The ending of the name decides the format");
+    }
     const bool quit = s.leaving->quit;
     if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.ask(request::SaveAndLeave{});
-    tip("Save to the file above first");
+    tip("Save as said above first");
     ImGui::SameLine();
     if (ImGui::Button(quit ? "Quit" : "Open")) s.ask(request::Leave{});
-    tip("The edits are lost");
+    tip("It is lost");
     ImGui::SameLine();
     if (ImGui::Button("Stay")) s.ask(request::Stay{});
     tip("Esc");
@@ -101,6 +109,8 @@ void side_panel(Session& s, float height) {
     performance_panel(s);
     accuracy_panel(s);
     effects_panel(s);
+    mesh_panel(s);
+    measure_panel(s);
     edit_panel(s);
     path_panel(s);
     if (ImGui::Button("Keys and mouse (?)")) s.help = !s.help;
@@ -137,6 +147,7 @@ void draw_panels(Session& s) {
     empty_hint(s, width, height);
     draw_panes(s);
     if (s.panels) {
+        draw_measurement(s, static_cast<int>(width), static_cast<int>(height));
         draw_tools(s, static_cast<int>(width), static_cast<int>(height));
         if (s.selection.shown) draw_region(s, static_cast<int>(width), static_cast<int>(height));
         side_panel(s, height);

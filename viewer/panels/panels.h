@@ -20,6 +20,8 @@ void performance_panel(Session& session);
 void accuracy_panel(Session& session);
 void effects_panel(Session& session);
 void edit_panel(Session& session);
+void mesh_panel(Session& session);
+void measure_panel(Session& session);
 void path_panel(Session& session);
 void training_panel(Session& session);
 /// Lists all keys where the user asked for them.
@@ -33,6 +35,8 @@ void tip(const char* text);
 void draw_panes(Session& session);
 /// The tool's stroke and gizmo.
 void draw_tools(const Session& session, int width, int height);
+/// What is measured, over the picture.
+void draw_measurement(const Session& session, int width, int height);
 /// Shows messages for some seconds.
 void draw_toasts(const Session& session);
 void open_window(Session& session);

@@ -57,9 +57,12 @@ void scene_panel(Session& s) {
     const Scene& scene = *s.scene;
     ImGui::TextWrapped("%s", scene_name(scene.file, true).c_str());
     tip(scene.file.string().c_str());
-    ImGui::Text("%zu splats, SH degree %d", scene.model.size() - s.edit.removed_count(),
-                scene.model.sh_degree);
+    if (!scene.is_points)
+        ImGui::Text("%zu splats, SH degree %d", scene.model.size() - s.edit.removed_count(),
+                    scene.model.sh_degree);
     ImGui::Text("%s, loaded in %.2f s", scene.format.c_str(), scene.load_s);
+    if (const double unit = s.edit.facts().metres_per_unit; unit > 0)
+        ImGui::Text("a unit is %.4g m", unit);
     for (const std::string& note : scene.notes) ImGui::TextWrapped("%s", note.c_str());
 }
 
@@ -207,6 +210,8 @@ constexpr HelpRow kHelp[] = {
     {"1", "orbit with the left button again"},
     {"2, 3, 4, 5", "select: rectangle, lasso, brush, sphere"},
     {"6, 7, 8", "move, turn, scale"},
+    {"9", "measure: click points, drag one, click the first to close"},
+    {"Delete while measuring", "take the last point away"},
     {"Shift, Ctrl while selecting", "add, take away"},
     {"Ctrl+A, Ctrl+D, Ctrl+I", "select all, none, or the others"},
     {"Ctrl+H, Ctrl+U", "hide the selection, show everything hidden"},

@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <limits>
+#include <span>
+#include <utility>
 
 #include "engine/core/files.h"
 #include "engine/scene/edit_splats.h"
@@ -161,6 +163,43 @@ TEST(SplatFile, a_row_of_the_table_answers_everywhere) {
         }
     }
     fs::remove_all(folder);
+}
+
+TEST(SplatFile, the_length_of_a_unit_is_kept_where_there_is_a_place) {
+    SplatModel model = sample_model(1, 40);
+    model.metres_per_unit = 0.1234567890123;
+    const fs::path folder =
+        fs::temp_directory_path() / ("darb_unit_length_" + std::to_string(::getpid()));
+    for (const auto& [format, name] :
+         {std::pair(SplatFormat::ply, "a.ply"), std::pair(SplatFormat::compressed_ply, "b.ply"),
+          std::pair(SplatFormat::gltf, "c.glb"), std::pair(SplatFormat::sog, "d.sog"),
+          std::pair(SplatFormat::streamed_sog, "e/lod-meta.json")}) {
+        fs::create_directories((folder / name).parent_path());
+        write_encoded(folder / name, encode_scene(format, model, name));
+        EXPECT_EQ(load_splats(folder / name).metres_per_unit, model.metres_per_unit) << name;
+    }
+    fs::remove_all(folder);
+    for (const SplatFormat format : {SplatFormat::spz, SplatFormat::dot_splat})
+        EXPECT_NE(losses_of(format, model).back().find("a unit is 0.1235 m"), std::string::npos);
+    transform_splats({.scale = 2}, model);
+    EXPECT_EQ(model.metres_per_unit, 0.1234567890123 / 2) << "units are half as long now";
+    EXPECT_EQ(pick_splats(model, {0, 1}).metres_per_unit, model.metres_per_unit);
+}
+
+TEST(SplatFile, a_length_of_a_unit_that_is_none_is_left_out) {
+    const std::vector<std::byte> file = encode_splats(SplatFormat::ply, sample_model(0, 2));
+    const std::string text(reinterpret_cast<const char*>(file.data()), file.size());
+    const std::string known = "comment SplatFootprint";
+    for (const char* bad : {"-1", "0", "nan", "1e999", "2 m", "much"}) {
+        std::string changed = text;
+        changed.insert(changed.find(known),
+                       std::string("comment SplatMetresPerUnit: ") + bad + "\n");
+        SplatFile facts;
+        const auto bytes = std::as_bytes(std::span(changed.data(), changed.size()));
+        EXPECT_EQ(parse_splats(bytes, "test", &facts).metres_per_unit, 0) << bad;
+        ASSERT_FALSE(facts.notes.empty()) << bad;
+        EXPECT_NE(facts.notes[0].find("is no length"), std::string::npos) << facts.notes[0];
+    }
 }
 
 TEST(SplatFile, what_a_format_has_no_place_for_is_said) {
