@@ -19,6 +19,7 @@
 #include "engine/core/files.h"
 #include "engine/data/colmap.h"
 #include "engine/data/depths.h"
+#include "engine/data/gps.h"
 #include "engine/data/image_io.h"
 #include "engine/data/run_colmap.h"
 #include "engine/data/source.h"
@@ -400,7 +401,10 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) try {
     fit_views(dataset, options);
     note_odd_cameras(dataset);
     note_coarse_points(dataset);
-    if (options.require_photos) find_depth_scale(dataset);
+    if (options.require_photos) {
+        find_depth_scale(dataset);
+        find_place(dataset);
+    }
     return dataset;
 } catch (const std::bad_alloc&) {
     throw NoRoom(path.string(), "does not fit into the memory that is left",

@@ -15,6 +15,7 @@
 #include "engine/core/image.h"
 #include "engine/data/hold_out.h"
 #include "engine/scene/camera.h"
+#include "engine/scene/earth_place.h"
 
 namespace darb {
 
@@ -98,7 +99,10 @@ struct Dataset {
     PointCloud start;         // training starts from these instead of points, unless empty
     bool has_alpha = false;   // some photo has an alpha channel, a mask, or gaps from undistortion
     double depth_scale = 1;   // world units a metre, for the measured depths
-    PhotoDetail detail;       // detail of the photos; 0 where it was not measured
+    double metres_per_unit =
+        0;               // how long a world unit is, by GPS or measured depths; 0: not known
+    EarthPlace place;    // where the scene lies on earth, by GPS
+    PhotoDetail detail;  // detail of the photos; 0 where it was not measured
     bool alpha_is_mask = false;      // some alpha comes from masks or gaps: pixels to leave out
     std::vector<std::string> notes;  // what was skipped, scaled or dropped, one sentence each
 };

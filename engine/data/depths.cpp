@@ -270,7 +270,10 @@ void find_depth_scale(Dataset& dataset) {
     std::vector<std::size_t> views;
     for (std::size_t v = 0; v < dataset.views.size(); ++v)
         if (!dataset.views[v].depth.empty()) views.push_back(v);
-    if (dataset.options.depth_scale) dataset.depth_scale = *dataset.options.depth_scale;
+    if (dataset.options.depth_scale) {
+        dataset.depth_scale = *dataset.options.depth_scale;
+        if (!views.empty()) dataset.metres_per_unit = 1 / dataset.depth_scale;
+    }
     if (views.empty() || dataset.options.depth_scale || dataset.points.seen_by.empty()) return;
     std::vector<double> ratios;
     const std::size_t count = std::min(views.size(), kViewsForScale);
@@ -287,6 +290,7 @@ void find_depth_scale(Dataset& dataset) {
     dataset.depth_scale = nearest_rank(ratios, 0.5);
     const double spread =
         (nearest_rank(ratios, 0.75) - nearest_rank(ratios, 0.25)) / dataset.depth_scale;
+    if (spread <= kOfTheSameScene) dataset.metres_per_unit = 1 / dataset.depth_scale;
     dataset.notes.push_back(fmt::format(
         "{}A metre of the measured depths is {:.4g} world units, by {} points (the middle half of "
         "them within {:.1f} %); --depth-scale says otherwise{}.",

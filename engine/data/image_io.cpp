@@ -17,6 +17,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/data/gps.h"
 
 namespace darb {
 
@@ -626,6 +627,54 @@ std::string tiff_time(Bytes tiff) {
     return text;
 }
 
+/// `count` unsigned rationals of a directory's entry; nothing where there are fewer, or one is
+/// divided by 0.
+template <std::size_t count>
+std::optional<std::array<double, count>> rationals(Bytes tiff, std::size_t directory,
+                                                   std::uint32_t tag, bool little) {
+    constexpr std::uint32_t kRational = 5;
+    const auto entry = find_entry(tiff, directory, tag, little);
+    if (!entry || entry->type != kRational || entry->count < count) return {};
+    const std::size_t at = read_uint(tiff, entry->value, 4, little);
+    if (at > tiff.size() || tiff.size() - at < 8 * count) return {};
+    std::array<double, count> values;
+    for (std::size_t i = 0; i < count; ++i) {
+        const double divisor = read_uint(tiff, at + 8 * i + 4, 4, little);
+        if (divisor == 0) return {};
+        values[i] = read_uint(tiff, at + 8 * i, 4, little) / divisor;
+    }
+    return values;
+}
+
+std::optional<GeoPosition> tiff_position(Bytes tiff) {
+    constexpr std::uint32_t kGpsTag = 0x8825, kLatitudeRef = 1, kLatitude = 2, kLongitudeRef = 3,
+                            kLongitude = 4, kAltitudeRef = 5, kAltitude = 6;
+    bool little = false;
+    if (!is_tiff(tiff, little)) return {};
+    const auto gps = find_entry(tiff, read_uint(tiff, 4, 4, little), kGpsTag, little);
+    if (!gps) return {};
+    const std::size_t directory = read_uint(tiff, gps->value, 4, little);
+    const auto letter = [&](std::uint32_t tag) {
+        const auto entry = find_entry(tiff, directory, tag, little);
+        return entry ? static_cast<char>(tiff[entry->value]) : '\0';
+    };
+    const auto latitude = rationals<3>(tiff, directory, kLatitude, little);
+    const auto longitude = rationals<3>(tiff, directory, kLongitude, little);
+    const auto altitude = rationals<1>(tiff, directory, kAltitude, little);
+    if (!latitude || !longitude || !altitude) return {};
+    const auto degrees = [](const std::array<double, 3>& parts) {
+        return parts[0] + parts[1] / 60 + parts[2] / 3600;
+    };
+    GeoPosition position{degrees(*latitude), degrees(*longitude), (*altitude)[0]};
+    if (position.latitude > 90 || position.longitude > 180) return {};
+    if (position.latitude == 0 && position.longitude == 0)
+        return {};  // as cameras without a fix write
+    if (letter(kLatitudeRef) == 'S') position.latitude *= -1;
+    if (letter(kLongitudeRef) == 'W') position.longitude *= -1;
+    if (letter(kAltitudeRef) == 1) position.altitude *= -1;  // below the sea
+    return position;
+}
+
 /// What follows "Exif" in the file; empty where there is none.
 Bytes exif_of(Bytes file) {
     constexpr std::uint32_t kStartOfImage = 0xd8, kStartOfScan = 0xda, kApp1 = 0xe1;
@@ -661,6 +710,10 @@ int exif_focal_35mm(Bytes file) {
 
 std::string exif_time(Bytes file) {
     return tiff_time(exif_of(file));
+}
+
+std::optional<GeoPosition> exif_position(Bytes file) {
+    return tiff_position(exif_of(file));
 }
 
 namespace {

@@ -29,9 +29,10 @@ constexpr int kMostSide = 32'768;  // px
 glm::dmat3 axes_for(const OrthophotoOptions& options) {
     const glm::dvec3 forward = -glm::normalize(options.from);
     glm::dvec3 up = options.up;
-    // From above, the top of the picture is the axis that a map has there: y where z is up.
     if (std::abs(glm::dot(up, forward)) > 0.9)
-        up = std::abs(forward.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1);
+        up = options.north != glm::dvec3(0.0) ? options.north
+             : std::abs(forward.y) < 0.9      ? glm::dvec3(0, 1, 0)
+                                              : glm::dvec3(0, 0, 1);
     const glm::dvec3 down = glm::normalize(forward * glm::dot(up, forward) - up);
     return glm::transpose(glm::dmat3(glm::cross(down, forward), down, forward));
 }
@@ -136,14 +137,20 @@ ImageU8 draw_orthophoto(const Orthophoto& photo, const RenderTile& render) {
     return picture;
 }
 
-std::optional<std::string> world_file(const Orthophoto& photo, const glm::dvec3& origin) {
+MapFrame map_of(const SplatModel& model) {
+    return {model.metres_per_unit, model.place.rotation, model.place.offset};
+}
+
+std::optional<std::string> world_file(const Orthophoto& photo, const MapFrame& map) {
     const glm::dmat3 rows = glm::transpose(photo.axes);
-    const auto right = axis_of(rows[0]), down = axis_of(rows[1]);
+    const glm::dvec3 to_right = map.rotation * rows[0], to_below = map.rotation * rows[1];
+    const auto right = axis_of(to_right), down = axis_of(to_below);
     if (!right || !down) return std::nullopt;
-    const double to_right = photo.pixel * rows[0][*right], to_below = photo.pixel * rows[1][*down];
-    const glm::dvec3 corner = photo.corner + origin;
-    return fmt::format("{:.12g}\n0\n0\n{:.12g}\n{:.12g}\n{:.12g}\n", to_right, to_below,
-                       corner[*right] + 0.5 * to_right, corner[*down] + 0.5 * to_below);
+    const double pixel = map.scale * photo.pixel;
+    const glm::dvec3 first = map.scale * (map.rotation * photo.corner) + map.offset +
+                             0.5 * pixel * (to_right + to_below);
+    return fmt::format("{:.12g}\n0\n0\n{:.12g}\n{:.12g}\n{:.12g}\n", pixel * to_right[*right],
+                       pixel * to_below[*down], first[*right], first[*down]);
 }
 
 }  // namespace darb

@@ -30,6 +30,7 @@ struct Orthophoto {
 struct OrthophotoOptions {
     glm::dvec3 from{0, 0, 1};  // unit, world: the side that the viewer is on
     glm::dvec3 up{0, 0, 1};    // unit, world: what is up in the picture, unless it is along `from`
+    glm::dvec3 north{0.0};     // what is up then; 0: y or, where that is along `from`, z
     double pixel = 0;          // side of a pixel, world units; 0: as `longest` says
     int longest = 2048;        // px of the longer side, where `pixel` is 0
 };
@@ -51,8 +52,17 @@ std::vector<OrthophotoTile> tiles_of(const Orthophoto& photo);
 using RenderTile = std::function<ImageU8(const OrthophotoTile&)>;
 ImageU8 draw_orthophoto(const Orthophoto& photo, const RenderTile& render);
 
+/// Where a world position p is on a map: scale * rotation * p + offset. As it is, the world is.
+struct MapFrame {
+    double scale = 1;
+    glm::dmat3 rotation{1.0};
+    glm::dvec3 offset{0.0};
+};
+/// Metres to the east, north and up of the scene's anchor on earth, which must be known.
+MapFrame map_of(const SplatModel& model);
+
 /// The six lines of an ESRI world file (.pgw), which says where on a map the pixels are, where
-/// right and down are axes of the world; otherwise nothing. origin: what is added to all positions.
-std::optional<std::string> world_file(const Orthophoto& photo, const glm::dvec3& origin);
+/// right and down are axes of the map; otherwise nothing.
+std::optional<std::string> world_file(const Orthophoto& photo, const MapFrame& map = {});
 
 }  // namespace darb

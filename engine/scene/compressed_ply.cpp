@@ -345,7 +345,7 @@ const SplatFormatRow& compressed_ply_format() {
         .endings = {".compressed.ply"},
         .encode = [](const SplatModel& model, const std::string&,
                      const EncodeOptions&) { return EncodedSplats{encode_compressed_ply(model)}; },
-        .keeps = kKeepsKernel | kKeepsRenderMode | kKeepsHarmonics | kKeepsUnit,
+        .keeps = kKeepsKernel | kKeepsRenderMode | kKeepsHarmonics | kKeepsUnit | kKeepsPlace,
         .cuts = [](const SplatModel& model,
                    const std::string&) { return compressed_ply_losses(model); }};
     return row;

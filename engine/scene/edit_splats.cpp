@@ -79,6 +79,9 @@ void transform_splats(const Similarity& similarity, SplatModel& model) {
     const double grown = std::log(similarity.scale);
     for (float& value : model.log_scale) value = static_cast<float>(value + grown);
     model.metres_per_unit /= similarity.scale;
+    if (model.place.known())
+        model.place = moved_place(model.place, similarity.turn, similarity.translation,
+                                  model.metres_per_unit);
     if (similarity.turn == glm::dmat3(1.0)) return;
     turn_rotations(similarity.turn, model.rotation);
     rotate_sh(sh_rotation(similarity.turn), model.sh_degree, model.sh_rest);
@@ -136,6 +139,7 @@ SplatModel pick_splats(const SplatModel& model, const std::vector<std::uint32_t>
     out.antialias = model.antialias;
     out.origin = model.origin;
     out.metres_per_unit = model.metres_per_unit;
+    out.place = model.place;
     gather(model, splats, out);
     return out;
 }

@@ -23,8 +23,8 @@ struct Similarity {
     glm::dvec3 translation{0.0};  // world
 };
 
-/// Transforms positions, log scales, rotations, harmonics and the unit; the only error is float32
-/// rounding.
+/// Transforms positions, log scales, rotations, harmonics, the unit and the place; the only error
+/// is float32 rounding.
 void transform_splats(const Similarity& similarity, SplatModel& model);
 
 /// The best origin for float32 positions, given positions [N][3]. On each axis it is the median

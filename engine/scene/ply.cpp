@@ -270,7 +270,7 @@ const SplatFormatRow& ply_format() {
         .encode = [](const SplatModel& model, const std::string&,
                      const EncodeOptions&) { return EncodedSplats{encode_ply(model)}; },
         .keeps = kKeepsKernel | kKeepsRenderMode | kKeepsHarmonics | kKeepsDoublePositions |
-                 kKeepsUnturned | kKeepsShape | kKeepsUnit,
+                 kKeepsUnturned | kKeepsShape | kKeepsUnit | kKeepsPlace,
         .cuts = ply_losses};
     return row;
 }
@@ -347,6 +347,16 @@ void read_unit(const PlyHeader& header, SplatModel& model, std::vector<std::stri
                                     printable(text.substr(0, 40))));
 }
 
+void read_place(const PlyHeader& header, SplatModel& model, std::vector<std::string>& notes) {
+    const std::string_view text = last_value(header, "SplatEarthPlace");
+    if (text.empty()) return;
+    if (const std::optional<EarthPlace> place = place_from_text(text))
+        model.place = *place;
+    else
+        notes.push_back(fmt::format("the SplatEarthPlace '{}' is no place: left out",
+                                    printable(text.substr(0, 80))));
+}
+
 }  // namespace
 
 void read_ply_comments(const PlyHeader& header, const std::string& where, SplatModel& model,
@@ -375,6 +385,7 @@ void read_ply_comments(const PlyHeader& header, const std::string& where, SplatM
                     "Correct the comment to psi, or remove it.");
     read_render_mode(header, model, notes);
     read_unit(header, model, notes);
+    read_place(header, model, notes);
     if (stated_up(header) == "z")
         notes.emplace_back(
             "its comment 'Vertical axis: z' says what is up: darb view follows it, --up z of darb "
@@ -386,10 +397,11 @@ std::string stated_up(const PlyHeader& header) {
 }
 
 std::string ply_comments(const SplatModel& model) {
-    const std::string unit =
-        model.metres_per_unit > 0
-            ? fmt::format("comment SplatMetresPerUnit: {}\n", model.metres_per_unit)
-            : "";
+    std::string unit = model.metres_per_unit > 0
+                           ? fmt::format("comment SplatMetresPerUnit: {}\n", model.metres_per_unit)
+                           : "";
+    if (model.place.known())
+        unit += fmt::format("comment SplatEarthPlace: {}\n", place_text(model.place));
     return fmt::format(
         "comment SplatKernel: {}\ncomment SplatFootprint: {}\ncomment SplatRenderMode: {}\n{}{}",
         kernel_name(model.kernel), footprint_name(model.footprint),

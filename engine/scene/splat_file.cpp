@@ -93,6 +93,9 @@ std::vector<std::string> missing_places(const SplatFormatRow& row, const SplatMo
     if (!(row.keeps & kKeepsUnit) && model.metres_per_unit > 0)
         losses.push_back(fmt::format("{} has no place for the scale (a unit is {:.4g} m)", row.name,
                                      model.metres_per_unit));
+    if (!(row.keeps & kKeepsPlace) && model.place.known())
+        losses.push_back(
+            fmt::format("{} has no place for where the scene lies on earth", row.name));
     return losses;
 }
 

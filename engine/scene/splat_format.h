@@ -32,6 +32,7 @@ enum SplatFeature : unsigned {
     kKeepsUnturned = 16,        // splats without a rotation, which are never drawn
     kKeepsShape = 32,           // one per splat; other formats refuse kernels with shapes
     kKeepsUnit = 64,            // metres_per_unit
+    kKeepsPlace = 128,          // on earth
 };
 
 struct SplatFormatRow {

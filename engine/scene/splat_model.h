@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/kernels/kernel_family.h"
+#include "engine/scene/earth_place.h"
 #include "shaders/shared/attribute_list.h"
 #include "shaders/shared/limits.h"
 
@@ -138,6 +139,7 @@ struct SplatModel : SplatArrays<float> {
     bool antialias = false;      // SplatRenderMode: mip
     glm::dvec3 origin{0.0};      // added to every position on save; positions are relative to it
     double metres_per_unit = 0;  // how long a world unit is; 0: not known
+    EarthPlace place;            // where the scene lies on earth, if that is known
 
     size_t size() const { return opacity_logit.size(); }
     int rest_count() const { return static_cast<int>(attribute_floats(kShRest, sh_degree)); }

@@ -156,6 +156,7 @@ void print_scene_info(const json& info) {
     row("origin", vector_text(info["origin"]));
     if (info.contains("metres_per_unit"))
         row("unit", fmt::format("{:.6g} m", info["metres_per_unit"].get<double>()));
+    if (info.contains("place")) row("on earth", info["place"].get<std::string>());
     row("bounds", bounds_text(info["bounds"]));
     row("98 % within", bounds_text(info["inner_bounds"]));
     row("scale", percentiles_text(info["scale"]));
@@ -354,6 +355,7 @@ json scene_info(const std::filesystem::path& path, const StoredUnits& units) {
                  {"bounds", bounds(model, 0, 1)},
                  {"inner_bounds", bounds(model, 0.01, 0.99)}};
     if (model.metres_per_unit > 0) info["metres_per_unit"] = model.metres_per_unit;
+    if (model.place.known()) info["place"] = place_summary(model.place);
     add_splats(model, info);
     add_warnings(info);
     return info;

@@ -627,14 +627,20 @@ Camera first_camera(const CameraPath& path, const PixelSize& size) {
     return view.camera(size.width, size.height);
 }
 
-// Where the orthophoto lies, for programs: in the scene's world, origin included.
-nlohmann::json orthophoto_json(const Orthophoto& photo, const glm::dvec3& origin) {
+// Where the orthophoto lies, for programs: in the scene's world.
+nlohmann::json orthophoto_json(const Orthophoto& photo, const SplatModel& model) {
     const glm::dmat3 rows = glm::transpose(photo.axes);
-    const glm::dvec3 corner = photo.corner + origin;
     const auto list = [](const glm::dvec3& v) { return nlohmann::json{v.x, v.y, v.z}; };
-    return {{"width", photo.width},     {"height", photo.height}, {"pixel", photo.pixel},
-            {"right", list(rows[0])},   {"down", list(rows[1])},  {"forward", list(rows[2])},
-            {"top_left", list(corner)}, {"depth", photo.depth}};
+    nlohmann::json json{{"width", photo.width},           {"height", photo.height},
+                        {"pixel", photo.pixel},           {"right", list(rows[0])},
+                        {"down", list(rows[1])},          {"forward", list(rows[2])},
+                        {"top_left", list(photo.corner)}, {"depth", photo.depth}};
+    if (model.metres_per_unit > 0) json["metres_per_unit"] = model.metres_per_unit;
+    if (model.place.known())
+        json["anchor"] = {{"latitude", model.place.latitude},
+                          {"longitude", model.place.longitude},
+                          {"altitude", model.place.altitude}};
+    return json;
 }
 
 }  // namespace
@@ -648,13 +654,18 @@ int render_orthophoto(const RenderFlags& flags, const Accuracy& accuracy,
     SplatFile facts;
     SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, &facts, flags.units));
     note_unused_choices(flags.accuracy, model.kernel);
-    const glm::dvec3 up = up_of_scene(flags, model, cameras_of_turn(flags), facts.up);
+    // A scene whose place on earth is known has a map of its own.
+    const bool on_earth = model.place.known() && flags.film.up.empty();
+    const glm::dmat3 to_world = glm::transpose(model.place.rotation);
+    const glm::dvec3 up =
+        on_earth ? to_world[2] : up_of_scene(flags, model, cameras_of_turn(flags), facts.up);
     const bool above = flags.orthophoto.from == "above";
     const Orthophoto photo =
         orthophoto_of(model, {.from = above ? up : up_from_name(flags.orthophoto.from),
                               .up = up,
+                              .north = on_earth ? to_world[1] : glm::dvec3(0.0),
                               .pixel = flags.orthophoto.pixel});
-    const std::optional<std::string> map = world_file(photo, model.origin);
+    const std::optional<std::string> map = world_file(photo, on_earth ? map_of(model) : MapFrame());
     const Paths outputs{flags.output / "orthophoto.png", flags.output / "orthophoto.json",
                         map ? flags.output / "orthophoto.pgw" : std::filesystem::path()};
     refuse_to_overwrite_inputs(outputs, files_of(flags.scene));
@@ -676,7 +687,7 @@ int render_orthophoto(const RenderFlags& flags, const Accuracy& accuracy,
                   plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
                   return to_8bit(image);
               }));
-    write_file_atomic(outputs[1], orthophoto_json(photo, model.origin).dump(1) + "\n");
+    write_file_atomic(outputs[1], orthophoto_json(photo, model).dump(1) + "\n");
     if (map) write_file_atomic(outputs[2], *map);
     written.wrote(outputs);
     std::FILE* const out = flags.quiet ? nullptr : stdout;

@@ -227,6 +227,8 @@ void Run::save_model(int iteration) {
     stopwatch(false);
     summary_.model = model_path(iteration);
     SplatModel model = trainer_.model();
+    model.metres_per_unit = dataset_.metres_per_unit;
+    model.place = dataset_.place;
     if (const std::size_t lost = drop_non_finite(model); lost > 0)
         progress_.warn(fmt::format("{} splats with NaN or infinity are left out of {}", lost,
                                    summary_.model.string()));

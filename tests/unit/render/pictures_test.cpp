@@ -68,7 +68,7 @@ TEST(Orthophoto, pixels_are_alike_at_every_place_and_depth) {
 TEST(Orthophoto, world_files_say_where_pixels_are_on_the_map) {
     const SplatModel model = box_of_splats();
     const Orthophoto above = orthophoto_of(model, {.pixel = 0.5});
-    const auto map = world_file(above, {1000, 2000, 0});
+    const auto map = world_file(above, {.offset = {1000, 2000, 0}});
     ASSERT_TRUE(map);
     double a, d, b, e, c, f;
     ASSERT_EQ(std::sscanf(map->c_str(), "%lf%lf%lf%lf%lf%lf", &a, &d, &b, &e, &c, &f), 6);
@@ -78,8 +78,19 @@ TEST(Orthophoto, world_files_say_where_pixels_are_on_the_map) {
     EXPECT_EQ(d, 0);
     EXPECT_NEAR(c, 1000 + 100 - 5.2 + 0.25, 0.1) << "the middle of the first pixel";
     EXPECT_NEAR(f, 2000 + 200 + 3.12 - 0.25, 0.1);
-    EXPECT_FALSE(world_file(
-        orthophoto_of(model, {.from = glm::normalize(glm::dvec3(0, 1, 5)), .pixel = 0.5}), {}));
+    const glm::dvec3 tilted = glm::normalize(glm::dvec3(0, 1, 5));
+    const Orthophoto oblique = orthophoto_of(model, {.from = tilted, .pixel = 0.5});
+    EXPECT_FALSE(world_file(oblique));
+    // On a map whose up is tilted so, it is level, in metres.
+    SplatModel placed = model;
+    placed.metres_per_unit = 2;
+    const glm::dvec3 north = glm::normalize(glm::cross(tilted, glm::dvec3(1, 0, 0)));
+    placed.place.rotation = glm::transpose(glm::dmat3(glm::dvec3(1, 0, 0), north, tilted));
+    const Orthophoto level =
+        orthophoto_of(placed, {.from = tilted, .up = tilted, .north = north, .pixel = 0.5});
+    const auto metres = world_file(level, map_of(placed));
+    ASSERT_TRUE(metres);
+    EXPECT_EQ(metres->substr(0, 9), "1\n0\n0\n-1\n");
 }
 
 TEST(Orthophoto, a_side_shows_what_is_up_at_the_top) {

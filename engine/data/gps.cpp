@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: MIT
+#include "engine/data/gps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/core/quantile.h"
+#include "engine/core/rng.h"
+#include "engine/data/image_io.h"
+
+namespace darb {
+
+namespace {
+
+using glm::dmat3;
+using glm::dvec3;
+
+constexpr double kEarthRadius = 6378137.0;              // WGS 84: of the equator, metres
+constexpr double kEccentricity2 = 6.69437999014132e-3;  // squared
+constexpr std::size_t kFewestPositions = 4;
+constexpr double kInliers = 3;        // times the median distance
+constexpr double kLeastWidth = 0.02;  // of the length of a path: narrower is a line
+constexpr double kTooCoarse = 0.2;    // of the reach
+constexpr std::size_t kPhotoHead = 1 << 17;
+
+// Earth-centred, earth-fixed, metres.
+dvec3 on_earth(const GeoPosition& p) {
+    const double latitude = glm::radians(p.latitude), longitude = glm::radians(p.longitude);
+    const double s = std::sin(latitude), c = std::cos(latitude);
+    const double normal = kEarthRadius / std::sqrt(1 - kEccentricity2 * s * s);
+    return {(normal + p.altitude) * c * std::cos(longitude),
+            (normal + p.altitude) * c * std::sin(longitude),
+            (normal * (1 - kEccentricity2) + p.altitude) * s};
+}
+
+/// to = scale * rotation * from + offset.
+struct Fit {
+    double scale = 0;
+    dmat3 rotation{1.0};
+    dvec3 offset{0.0};
+    dvec3 operator()(const dvec3& from) const { return scale * (rotation * from) + offset; }
+};
+
+/// The eigenvector of the largest eigenvalue of a symmetric 4 x 4 matrix, by Jacobi rotations.
+std::array<double, 4> largest_eigenvector(std::array<std::array<double, 4>, 4> m) {
+    std::array<std::array<double, 4>, 4> v{};
+    for (std::size_t i = 0; i < 4; ++i) v[i][i] = 1;
+    for (int sweep = 0; sweep < 30; ++sweep)
+        for (std::size_t p = 0; p < 3; ++p)
+            for (std::size_t q = p + 1; q < 4; ++q) {
+                if (m[p][q] == 0) continue;
+                const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+                const double t =
+                    (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
+                const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+                for (std::size_t k = 0; k < 4; ++k) {
+                    const double a = m[k][p], b = m[k][q];
+                    m[k][p] = c * a - s * b;
+                    m[k][q] = s * a + c * b;
+                }
+                for (std::size_t k = 0; k < 4; ++k) {
+                    const double a = m[p][k], b = m[q][k];
+                    m[p][k] = c * a - s * b;
+                    m[q][k] = s * a + c * b;
+                    const double x = v[k][p], y = v[k][q];
+                    v[k][p] = c * x - s * y;
+                    v[k][q] = s * x + c * y;
+                }
+            }
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < 4; ++i)
+        if (m[i][i] > m[best][best]) best = i;
+    return {v[0][best], v[1][best], v[2][best], v[3][best]};
+}
+
+// Least squares (Horn 1987), with the scale from the spreads of both.
+Fit fit_similarity(const std::vector<dvec3>& from, const std::vector<dvec3>& to) {
+    const double count = static_cast<double>(from.size());
+    dvec3 a(0.0), b(0.0);
+    for (std::size_t i = 0; i < from.size(); ++i) {
+        a += from[i] / count;
+        b += to[i] / count;
+    }
+    double s[3][3] = {}, spread_a = 0, spread_b = 0;
+    for (std::size_t i = 0; i < from.size(); ++i) {
+        const dvec3 x = from[i] - a, y = to[i] - b;
+        for (glm::length_t r = 0; r < 3; ++r)
+            for (glm::length_t c = 0; c < 3; ++c) s[r][c] += x[r] * y[c];
+        spread_a += glm::dot(x, x);
+        spread_b += glm::dot(y, y);
+    }
+    const auto q = largest_eigenvector(
+        {{{s[0][0] + s[1][1] + s[2][2], s[1][2] - s[2][1], s[2][0] - s[0][2], s[0][1] - s[1][0]},
+          {s[1][2] - s[2][1], s[0][0] - s[1][1] - s[2][2], s[0][1] + s[1][0], s[2][0] + s[0][2]},
+          {s[2][0] - s[0][2], s[0][1] + s[1][0], s[1][1] - s[0][0] - s[2][2], s[1][2] + s[2][1]},
+          {s[0][1] - s[1][0], s[2][0] + s[0][2], s[1][2] + s[2][1], s[2][2] - s[0][0] - s[1][1]}}});
+    const double w = q[0], x = q[1], y = q[2], z = q[3];
+    Fit fit;
+    fit.rotation = glm::transpose(
+        dmat3(dvec3(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+              dvec3(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+              dvec3(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))));
+    fit.scale = spread_a > 0 ? std::sqrt(spread_b / spread_a) : 0;
+    fit.offset = b - fit.scale * (fit.rotation * a);
+    return fit;
+}
+
+double median_off(const Fit& fit, std::span<const dvec3> from, const std::vector<dvec3>& to) {
+    std::vector<double> off;
+    for (std::size_t i = 0; i < to.size(); ++i) off.push_back(glm::distance(fit(from[i]), to[i]));
+    return nearest_rank(off, 0.5);
+}
+
+/// How wide points are across the line through them, as a share of how long they are.
+double width_of(const std::vector<dvec3>& points) {
+    dvec3 middle(0.0), along(0.0);
+    for (const dvec3& p : points) middle += p / double(points.size());
+    for (const dvec3& p : points)
+        if (glm::length(p - middle) > glm::length(along)) along = p - middle;
+    const double length = glm::length(along);
+    if (!(length > 0)) return 0;
+    double width = 0;
+    for (const dvec3& p : points)
+        width = std::max(width, glm::length(glm::cross(p - middle, along / length)));
+    return width / length;
+}
+
+Fit robust_fit(std::span<const dvec3> centres, const std::vector<dvec3>& metres) {
+    constexpr int kTries = 200;
+    Fit best = fit_similarity({centres.begin(), centres.end()}, metres);
+    double least = median_off(best, centres, metres);
+    Pcg32 rng(1);
+    for (int t = 0; t < kTries && centres.size() > kFewestPositions; ++t) {
+        std::vector<dvec3> from, to;
+        for (int k = 0; k < 4; ++k) {
+            const std::size_t i = rng.below(static_cast<std::uint32_t>(centres.size()));
+            from.push_back(centres[i]);
+            to.push_back(metres[i]);
+        }
+        const Fit fit = fit_similarity(from, to);
+        const double off = median_off(fit, centres, metres);
+        if (fit.scale > 0 && off < least) {
+            least = off;
+            best = fit;
+        }
+    }
+    return best;
+}
+
+}  // namespace
+
+dvec3 east_north_up(const GeoPosition& position, const GeoPosition& origin) {
+    const dvec3 d = on_earth(position) - on_earth(origin);
+    const double latitude = glm::radians(origin.latitude),
+                 longitude = glm::radians(origin.longitude);
+    const double sa = std::sin(latitude), ca = std::cos(latitude);
+    const double so = std::sin(longitude), co = std::cos(longitude);
+    return {-so * d.x + co * d.y, -sa * co * d.x - sa * so * d.y + ca * d.z,
+            ca * co * d.x + ca * so * d.y + sa * d.z};
+}
+
+std::optional<FoundPlace> place_by_positions(std::span<const dvec3> centres,
+                                             std::span<const GeoPosition> positions) {
+    if (centres.size() != positions.size())
+        throw Error("positions", "there are not as many as cameras", "Give one for each camera.");
+    if (centres.size() < kFewestPositions) return std::nullopt;
+    GeoPosition origin;
+    std::vector<double> latitudes, longitudes, altitudes;
+    for (const GeoPosition& p : positions) {
+        latitudes.push_back(p.latitude);
+        longitudes.push_back(p.longitude);
+        altitudes.push_back(p.altitude);
+    }
+    origin = {nearest_rank(latitudes, 0.5), nearest_rank(longitudes, 0.5),
+              nearest_rank(altitudes, 0.5)};
+    std::vector<dvec3> metres;
+    for (const GeoPosition& p : positions) metres.push_back(east_north_up(p, origin));
+    Fit fit = robust_fit(centres, metres);
+    FoundPlace found;
+    for (int round = 0; round < 3; ++round) {  // again with those that fit
+        const double limit = kInliers * median_off(fit, centres, metres);
+        std::vector<dvec3> from, to;
+        for (std::size_t i = 0; i < metres.size(); ++i)
+            if (glm::distance(fit(centres[i]), metres[i]) <= limit) {
+                from.push_back(centres[i]);
+                to.push_back(metres[i]);
+            }
+        if (from.size() < kFewestPositions || width_of(from) < kLeastWidth) return std::nullopt;
+        fit = fit_similarity(from, to);
+        found.used = from.size();
+    }
+    if (!(fit.scale > 0) || !std::isfinite(fit.scale)) return std::nullopt;
+    found.metres_per_unit = fit.scale;
+    found.off = median_off(fit, centres, metres);
+    std::vector<double> reach;
+    for (const dvec3& p : metres) reach.push_back(glm::length(p));
+    found.reach = nearest_rank(reach, 0.5);
+    found.place = {origin.latitude, origin.longitude, origin.altitude, fit.rotation, fit.offset};
+    return found;
+}
+
+void find_place(Dataset& dataset) {
+    std::vector<dvec3> centres;
+    std::vector<GeoPosition> positions;
+    std::filesystem::path last;
+    for (const View& view : dataset.views) {
+        if (view.photo == last || view.photo.empty()) continue;  // faces of one panorama
+        last = view.photo;
+        std::error_code none;
+        if (!std::filesystem::is_regular_file(view.photo, none)) continue;
+        if (const auto position = exif_position(read_file_head(view.photo, kPhotoHead))) {
+            centres.push_back(view.camera.centre());
+            positions.push_back(*position);
+        }
+    }
+    if (positions.size() < kFewestPositions) return;
+    const std::optional<FoundPlace> found = place_by_positions(centres, positions);
+    if (!found) {
+        dataset.notes.push_back(
+            "The photos' GPS positions do not tell the scene's scale: they lie on one line, or "
+            "contradict each other.");
+        return;
+    }
+    if (found->off > kTooCoarse * found->reach) {
+        dataset.notes.push_back(fmt::format(
+            "The photos' GPS positions are too coarse to tell the scene's scale: cameras are off "
+            "by {:.1f} m, where they are spread over {:.1f} m.",
+            found->off, found->reach));
+        return;
+    }
+    dataset.place = found->place;
+    std::string scale = "Scale, north";
+    if (dataset.metres_per_unit > 0) {  // measured depths are more exact
+        dvec3 middle(0.0);
+        for (const dvec3& centre : centres) middle += centre / double(centres.size());
+        dataset.place.offset +=
+            (found->metres_per_unit - dataset.metres_per_unit) * (dataset.place.rotation * middle);
+        scale = fmt::format("By the measured depths it is {:.4g} m, which counts. North",
+                            dataset.metres_per_unit);
+    } else {
+        dataset.metres_per_unit = found->metres_per_unit;
+    }
+    const double ratio = found->metres_per_unit / dataset.metres_per_unit;
+    dataset.notes.push_back(fmt::format(
+        "{}By the GPS of {} photos a world unit is {:.4g} m; cameras are off by {:.2g} m (median). "
+        "{} and place are saved with the scene.",
+        std::abs(std::log(ratio)) > kContradiction ? "Warning: GPS and depths contradict. " : "",
+        found->used, found->metres_per_unit, found->off, scale));
+}
+
+}  // namespace darb
