@@ -24,9 +24,10 @@ using glm::dvec3;
 constexpr double kEarthRadius = 6378137.0;              // WGS 84: of the equator, metres
 constexpr double kEccentricity2 = 6.69437999014132e-3;  // squared
 constexpr std::size_t kFewestPositions = 4;
-constexpr double kInliers = 3;        // times the median distance
-constexpr double kLeastWidth = 0.02;  // of the length of a path: narrower is a line
-constexpr double kTooCoarse = 0.2;    // of the reach
+constexpr double kInliers = 3;           // times the median distance
+constexpr double kLeastWidth = 0.02;     // of the length of a path: narrower is a line
+constexpr double kTooCoarse = 0.2;       // of the reach
+constexpr double kContradiction = 0.15;  // of two scales, in natural logarithms
 constexpr std::size_t kPhotoHead = 1 << 17;
 
 // Earth-centred, earth-fixed, metres.
