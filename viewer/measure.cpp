@@ -50,11 +50,11 @@ MeasuredLengths measured_lengths(const Measurement& measurement, const glm::dvec
 }
 
 std::optional<glm::dvec3> up_of_ground(const Measurement& measurement, const glm::dvec3& up) {
-    constexpr double kLine = 1e-6;  // of the square of the longest side
+    constexpr double kOnALine = 1e-6;  // of the square of the longest side
     if (measurement.points.size() < 3) return {};
     const double longest = longest_side(measured_lengths(measurement, up).sides);
     const glm::dvec3 area = area_vector(measurement.points);
-    if (!(glm::length(area) > kLine * longest * longest)) return {};
+    if (!(glm::length(area) > kOnALine * longest * longest)) return {};
     const glm::dvec3 normal = glm::normalize(area);
     return glm::dot(normal, up) < 0 ? -normal : normal;
 }

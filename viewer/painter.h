@@ -122,6 +122,8 @@ class Painter {
     void cancel_work() { work_.cancel(); }
     bool draws_work() const { return work_.draws(); }
     bool exports() const { return work_.exports(); }
+    /// Whether a mesh is being read or made.
+    bool meshes() const { return work_.meshes(); }
     /// Does a step of an export; wait: waits for the video, too. Throws Error.
     void step_export(bool wait);
 

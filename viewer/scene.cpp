@@ -66,13 +66,13 @@ Scene mesh_scene_of(std::span<const std::byte> bytes, const std::filesystem::pat
     if (progress) progress(kReadShare, "decoding");
     std::vector<std::string> notes;
     TriangleMesh mesh = parse_mesh(bytes, scene.file.string(), folder, &notes);
-    const bool has_faces = mesh.face_count() > 0;
+    const bool holds_faces = mesh.face_count() > 0;
     if (progress) progress(kReadShare + kDecodeShare, "measuring");
     scene.model = points_as_splats(vertices_of(mesh));
     scene.is_points = true;
-    scene.format = has_faces ? fmt::format("mesh of {} faces", mesh.face_count()) : "point cloud";
+    scene.format = holds_faces ? fmt::format("mesh of {} faces", mesh.face_count()) : "point cloud";
     scene.notes = notes;
-    if (has_faces) {
+    if (holds_faces) {
         scene.mesh = shown_mesh_of(std::move(mesh), scene.file, {});
         for (const std::string& note : scene.mesh->notes) scene.notes.push_back(note);
     } else {

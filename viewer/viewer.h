@@ -54,8 +54,9 @@ class Viewer {
     /// Exports the session's path and blocks until it is done. For use without a window. Throws
     /// Error.
     void export_path_now();
-    /// Whether the picture is whole and one in motion would not have to wait for anything.
-    bool at_rest() const { return !loading() && painter_.at_rest(); }
+    /// Whether the picture is whole and one in motion would not have to wait for anything; and no
+    /// mesh is being read or made.
+    bool at_rest() const { return !loading() && !painter_.meshes() && painter_.at_rest(); }
     /// Whether the picture has all pixels, and at least the most important splats.
     bool refined() const { return painter_.refined(); }
     /// Whether no levels of merged splats for motion are still being made.

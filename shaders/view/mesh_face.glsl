@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A face of a mesh as a pinhole sees it. Whether it covers a pixel follows from the planes through the eye and its sides,
-// so nothing needs to be clipped. Needs MeshDrawArgs as `args`; binds the mesh at 0 and 1.
+// A face of a mesh as a pinhole sees it. Whether it covers a pixel follows from the planes through the eye and its
+// sides, so nothing needs to be clipped. Needs MeshDrawArgs as `args`; binds the mesh at 0 and 1.
 layout(set = 0, binding = 0, scalar) readonly buffer Position { vec3 position[]; };  // [V]
 layout(set = 0, binding = 1, scalar) readonly buffer Faces { uvec3 faces[]; };       // [F]
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Draws the faces of a mesh that cover few pixels, and lists the others for mesh_raster_large.comp.
-// Place: in the viewer, where a mesh is shown. Work: a thread a face, over the pixels of its bounding box. Shared memory:
-// none. Reads the mesh; writes depths and faces by atomic minima, which have no order, and the list of large faces,
-// whose order does not matter.
+// Place: in the viewer, where a mesh is shown. Work: a thread a face, over the pixels of its bounding box. Shared
+// memory: none. Reads the mesh; writes depths and faces by atomic minima, which have no order, and the list of large
+// faces, whose order does not matter.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

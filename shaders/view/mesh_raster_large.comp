@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Draws the faces of a mesh that cover many pixels.
-// Place: after each step of mesh_raster.comp. Work: a workgroup takes every MESH_LARGE_GROUPS-th face of the list, of it
-// every MESH_PARTS-th row of blocks of 8 x 8 pixels, and of a block a pixel a thread. So a thread makes few rounds, which
-// lavapipe limits. Shared memory: none. Reads the mesh and the list; writes depths and faces by atomic minima.
+// Place: after each step of mesh_raster.comp. Work: a workgroup takes every MESH_LARGE_GROUPS-th face of the list, of
+// it every MESH_PARTS-th row of blocks of 8 x 8 pixels, and of a block a pixel a thread. So a thread makes few rounds,
+// which lavapipe limits. Shared memory: none. Reads the mesh and the list; writes depths and faces by atomic minima.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

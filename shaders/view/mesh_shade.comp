@@ -28,8 +28,8 @@ vec3 shape_of(Face f, vec3 ray) {
     return vec3(0.93, 0.95, 1.0) * light;
 }
 
-// The share of a pixel that the nearest side of the face darkens, as if it were a line. It fades where the face is hardly
-// wider than its lines, as these would leave nothing else.
+// The share of a pixel that the nearest side of the face darkens, as if it were a line. It fades where the face is
+// hardly wider than its lines, as these would leave nothing else.
 float edge_at(Face f, vec3 ray) {
     float nearest = 3e38, width = 3e38;  // px; width: the least height of the face
     for (uint i = 0u; i < 3u; ++i) {

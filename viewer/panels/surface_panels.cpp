@@ -17,7 +17,7 @@ namespace darb {
 namespace {
 
 constexpr ImU32 kMeasured = IM_COL32(255, 225, 80, 255), kShade = IM_COL32(0, 0, 0, 170);
-constexpr ImU32 kInside = IM_COL32(255, 225, 80, 45), kText = IM_COL32(255, 250, 225, 255);
+constexpr ImU32 kInside = IM_COL32(255, 225, 80, 45), kLengthText = IM_COL32(255, 250, 225, 255);
 
 void how_shown(Session& s) {
     DisplaySettings& d = s.display;
@@ -177,8 +177,21 @@ void measure_panel(Session& s) {
 
 namespace {
 
-ImVec2 at(const glm::dvec2& p) {
+ImVec2 px_of(const glm::dvec2& p) {
     return {static_cast<float>(p.x), static_cast<float>(p.y)};
+}
+
+/// Whether Dear ImGui fills just the inside: the outline always turns the same way.
+bool is_convex(const std::vector<ImVec2>& outline) {
+    const std::size_t n = outline.size();
+    bool left = false, right = false;
+    for (std::size_t i = 0; i < n; ++i) {
+        const ImVec2 &a = outline[i], &b = outline[(i + 1) % n], &c = outline[(i + 2) % n];
+        const float turn = (b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x);
+        left |= turn < 0;
+        right |= turn > 0;
+    }
+    return !(left && right);
 }
 
 void draw_length(const ImVec2& a, const ImVec2& b, const std::string& text, float gui_scale) {
@@ -189,7 +202,7 @@ void draw_length(const ImVec2& a, const ImVec2& b, const std::string& text, floa
     const ImVec2 corner((a.x + b.x - size.x) / 2, (a.y + b.y - size.y) / 2);
     list.AddRectFilled(ImVec2(corner.x - 4, corner.y - 2),
                        ImVec2(corner.x + size.x + 4, corner.y + size.y + 2), kShade, 4 * gui_scale);
-    list.AddText(corner, kText, text.c_str());
+    list.AddText(corner, kLengthText, text.c_str());
 }
 
 }  // namespace
@@ -210,20 +223,21 @@ void draw_measurement(const Session& s, int width, int height) {
     }
     if (measured.closed && all) {
         std::vector<ImVec2> outline;
-        for (const auto& p : pixels) outline.push_back(at(*p));
-        list.AddConvexPolyFilled(outline.data(), static_cast<int>(outline.size()), kInside);
+        for (const auto& p : pixels) outline.push_back(px_of(*p));
+        if (is_convex(outline))
+            list.AddConvexPolyFilled(outline.data(), static_cast<int>(outline.size()), kInside);
     }
     const MeasuredLengths lengths = measured_lengths(measured, s.navigation.up);
     for (std::size_t i = 0; i < lengths.sides.size(); ++i) {
         const auto &a = pixels[i], &b = pixels[(i + 1) % pixels.size()];
         if (a && b)
-            draw_length(at(*a), at(*b), length_text(lengths.sides[i], facts.metres_per_unit),
+            draw_length(px_of(*a), px_of(*b), length_text(lengths.sides[i], facts.metres_per_unit),
                         s.gui_scale);
     }
     for (const auto& p : pixels) {
         if (!p) continue;
-        list.AddCircleFilled(at(*p), 6 * s.gui_scale, kShade);
-        list.AddCircleFilled(at(*p), 4 * s.gui_scale, kMeasured);
+        list.AddCircleFilled(px_of(*p), 6 * s.gui_scale, kShade);
+        list.AddCircleFilled(px_of(*p), 4 * s.gui_scale, kMeasured);
     }
 }
 
