@@ -19,8 +19,8 @@ namespace {
 constexpr int kTerms = LearnedProfile::kWeights, kDegree = kTerms;
 using Values = LearnedProfile::Values;
 
-// A Gaussian has no edge; exp(-8) of it is beyond this one.
-constexpr double kGaussianEdge = 16;
+// A Gaussian has no edge; at this one it is 0.004, which is what a pixel shows at most.
+constexpr double kGaussianEdge = 11;
 
 /// F_j(u) and its derivative n B_{j-1,n-1}(u), for j = 1..n.
 void partial_sums(double u, Values& value, Values& slope) {
@@ -103,7 +103,7 @@ Values on_simplex(const Values& v) {
 
 }  // namespace
 
-// Projected gradient with Nesterov's momentum: nine unknowns, a millisecond.
+// Projected gradient with Nesterov's momentum: six unknowns, a millisecond.
 Values nearest_weights(const std::function<double(double)>& f) {
     constexpr int kPoints = 200, kIterations = 5'000;
     std::array<Values, kTerms> matrix{};
@@ -229,16 +229,18 @@ Values LearnedProfile::by_logits(Footprint footprint, double q) const {
     return q < now.support ? slopes(now, footprint, 1 - q / now.support) : Values{};
 }
 
-// dw/d(logit) as a series of Chebyshev: exact with the footprint psi, as its degree is n. With
-// exact it ends in a root of u, which the terms left out miss by some 1 % of its share at the edge.
+// dw/d(logit) as a series of Chebyshev in sqrt(u). A line integral is sqrt(u) times a polynomial of
+// u, and its slope ends in sqrt(u), as F_j begin with u.
 Values LearnedProfile::gradient(Footprint footprint, std::span<const float> sums) const {
     DARB_CHECK(sums.size() == PROFILE_SUMS, "{} sums", sums.size());
-    constexpr int kNodes = 64;
+    static_assert(PROFILE_SUMS == 2 * kDegree + 2);
+    constexpr int kNodes = 32;
     const Parts now = parts();
     Values gradient{};
     for (int i = 0; i < kNodes; ++i) {
         const double angle = std::numbers::pi * (i + 0.5) / kNodes;
-        const Values at = slopes(now, footprint, (1 + std::cos(angle)) / 2);
+        const double root = (1 + std::cos(angle)) / 2;
+        const Values at = slopes(now, footprint, root * root);
         double share = 0;  // of this node in the sum over terms
         for (std::size_t k = 0; k < PROFILE_SUMS; ++k)
             share += (k == 0 ? 1.0 : 2.0) / kNodes * std::cos(static_cast<double>(k) * angle) *

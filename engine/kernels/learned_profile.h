@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A kernel whose profile training changes, one for the whole scene:
 //   w(q) = sum_j p_j F_j(u), u = 1 - q/R^2, F_j(u) = sum_{k >= j} B_{k,n}(u), j = 1..n,
-// with Bernstein's polynomials B_{k,n} of degree n = 9 and weights p > 0 of sum 1, the softmax of
+// with Bernstein's polynomials B_{k,n} of degree n = 6 and weights p > 0 of sum 1, the softmax of
 // what is learned. Each F_j rises from 0 at the edge to 1 at the centre, and so does every w: the
 // parameters cannot leave the set of kernels. R^2 follows from p so that psi, the second moment in
 // space, stays that of the kernel at the start. Formulas: docs/math.md, A profile that is learned.
@@ -20,7 +20,9 @@ namespace darb {
 
 class LearnedProfile {
   public:
-    static constexpr int kWeights = 9;  // n, so that w = u P(u) with P of KERNEL_MAX_DEGREE
+    /// n: w = u P(u) with P of degree 5, as short as that of built-in kernels. From n = 7 on, terms
+    /// of P in q cancel by more than float32 may lose (KernelCoefficients).
+    static constexpr int kWeights = 6;
     using Values = std::array<double, kWeights>;
 
     /// The profile nearest to a kernel, by least squares over u; its weights are at least
@@ -44,7 +46,8 @@ class LearnedProfile {
     double value(Footprint footprint, double q) const;
     Values by_logits(Footprint footprint, double q) const;
     /// dL/d(logits) from the sums that profile_gradient.comp leaves: sum over pixels and splats of
-    /// opacity dL/dalpha T_k(2u - 1), with T_k of Chebyshev.
+    /// opacity dL/dalpha T_k(2 sqrt(u) - 1), with T_k of Chebyshev. Exact, as dw/d(logit) is a
+    /// polynomial of sqrt(u) of degree 2n + 1 with either footprint.
     Values gradient(Footprint footprint, std::span<const float> sums) const;
 
     /// A kernel of its own, as a user's: `learned_` and eight hexadecimal digits.

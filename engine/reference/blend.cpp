@@ -396,7 +396,8 @@ void add_tile_profile(const TileLists& lists, size_t tile,
     tile_backward<T>(lists, tile, list, kernel, settings, d_image,
                      [&](const Blended<T>& b, T d_alpha, const PixelGradient<T>&) {
                          if (b.sample.clamped) return;
-                         const T angle = std::acos(1 - 2 * std::min(b.sample.q / support, T(1)));
+                         const T u = std::max(1 - b.sample.q / support, T(0));
+                         const T angle = std::acos(2 * std::sqrt(u) - 1);
                          for (size_t k = 0; k < sums.size(); ++k)
                              sums[k] += d_alpha * list[b.entry].opacity * std::cos(T(k) * angle);
                      });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What the gradient of a learned profile w(q) is made of: sums over pixels and splats of G T_k(2u - 1), with G =
-// opacity dL/dalpha, T_k of Chebyshev and u = 1 - q/R^2. Since w is a function of u alone, its derivative by any
-// parameter is one, too, and the host has dL/d(parameter) from these sums (engine/kernels/learned_profile.h).
+// What the gradient of a learned profile w(q) is made of: sums over pixels and splats of G T_k(2 sqrt(u) - 1), with G
+// = opacity dL/dalpha, T_k of Chebyshev and u = 1 - q/R^2. The derivative of w by any parameter is a polynomial of
+// sqrt(u), so that the host has dL/d(parameter) from these sums (engine/kernels/learned_profile.h).
 // Place: after the loss, before the backward blend, which overwrites what this pass reads where lists are long. Runs in
 // some iterations only, as a profile moves slowly. Source: docs/math.md, A profile that is learned.
 // Work: a workgroup a block of 8 x 8 pixels, a thread a pixel, which walks its tile's list from the end as
@@ -83,7 +83,7 @@ void add_splat(inout float sum[PROFILE_SUMS], inout Pixel px, uint splat, bool r
     const float g = counts && raw < ALPHA_MAX ? light.w * before * ahead : 0.0;
     px.behind += alpha * ahead;
     px.transmittance = before;
-    const float v = 1.0 - 2.0 * min(q * KERNEL_INVERSE_SUPPORT, 1.0);  // 2u - 1
+    const float v = 2.0 * sqrt(max(1.0 - q * KERNEL_INVERSE_SUPPORT, 0.0)) - 1.0;
     float t0 = g, t1 = g * v;  // G T_k and G T_k+1
     for (uint k = 0u; k < PROFILE_SUMS; ++k) {
         sum[k] += t0;

@@ -6,9 +6,10 @@
 
 #include "types.h"
 
-// Sums over pixels and splats of G T_k(2u - 1), k from 0: G = opacity dL/dalpha. From these follows
-// the gradient by every parameter of the profile, as dw/d(parameter) is a function of u alone.
-#define PROFILE_SUMS 16
+// Sums over pixels and splats of G T_k(2 sqrt(u) - 1), k from 0, with G = opacity dL/dalpha and
+// u = 1 - q/R^2. From these follows the gradient by every parameter of the profile, as
+// dw/d(parameter) is a polynomial of sqrt(u) of a lower degree.
+#define PROFILE_SUMS 14
 
 #define PROFILE_BLOCK_THREADS 64  // a thread a pixel of a block of 8 x 8
 #define PROFILE_ADD_STRANDS 16    // threads that share the rows of one sum

@@ -18,9 +18,9 @@ namespace {
 double apart(int one, int other) {
     double largest = 0;
     for (double q = 0; q < 20; q += 0.05)
-        largest = std::max(
-            largest, std::abs(kernel_value(one, Footprint::psi, q * kernel_psi(one)) -
-                              kernel_value(other, Footprint::psi, q * kernel_psi(other))));
+        largest =
+            std::max(largest, std::abs(kernel_value(one, Footprint::psi, q * kernel_psi(one)) -
+                                       kernel_value(other, Footprint::psi, q * kernel_psi(other))));
     return largest;
 }
 

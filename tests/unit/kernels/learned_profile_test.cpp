@@ -54,10 +54,13 @@ TEST(LearnedProfile, any_parameters_give_a_falling_kernel_that_darb_takes) {
 }
 
 TEST(LearnedProfile, starts_near_the_kernel_that_it_is_to_start_from) {
-    const std::pair<int, double> most[] = {
-        {KERNEL_GAUSSIAN, 0.01},     {KERNEL_RAISED_COSINE, 0.01}, {KERNEL_SINC, 0.01},
-        {KERNEL_PARABOLIC, 0.01},    {KERNEL_COSINE, 0.01},        {KERNEL_HALF_COSINE_SQUARED, 0.01},
-        {KERNEL_SQUARED_RAISED_COSINE, 0.01}};
+    const std::pair<int, double> most[] = {{KERNEL_GAUSSIAN, 0.02},
+                                           {KERNEL_RAISED_COSINE, 0.01},
+                                           {KERNEL_SINC, 0.01},
+                                           {KERNEL_PARABOLIC, 0.01},
+                                           {KERNEL_COSINE, 0.01},
+                                           {KERNEL_HALF_COSINE_SQUARED, 0.01},
+                                           {KERNEL_SQUARED_RAISED_COSINE, 0.01}};
     for (const auto& [kernel, distance] : most) {
         const LearnedProfile profile(kernel);
         EXPECT_LT(profile.distance_from_start(), distance) << kernel_name(kernel);
@@ -93,7 +96,8 @@ std::vector<float> sums_of(const std::vector<std::pair<double, double>>& samples
     std::vector<double> sums(PROFILE_SUMS, 0.0);
     for (const auto& [q, g] : samples)
         for (std::size_t k = 0; k < sums.size(); ++k)
-            sums[k] += g * std::cos(static_cast<double>(k) * std::acos(1 - 2 * q / support));
+            sums[k] += g * std::cos(static_cast<double>(k) *
+                                    std::acos(2 * std::sqrt(1 - q / support) - 1));
     return {sums.begin(), sums.end()};
 }
 
@@ -116,8 +120,7 @@ TEST(LearnedProfile, sums_over_samples_give_the_gradient) {
         }
         const auto got = profile.gradient(footprint, sums);
         for (std::size_t j = 0; j < got.size(); ++j)
-            EXPECT_NEAR(got[j], expected[j], (footprint == Footprint::psi ? 1e-5 : 2e-2) * scale)
-                << footprint_name(footprint) << " " << j;
+            EXPECT_NEAR(got[j], expected[j], 1e-5 * scale) << footprint_name(footprint) << " " << j;
     }
 }
 
@@ -128,8 +131,7 @@ std::pair<std::vector<float>, double> pull(const LearnedProfile& profile, Footpr
     double loss = 0;
     for (int i = 0; i < 100; ++i) {
         const double q = 0.06 * i;
-        const double away =
-            profile.value(footprint, q) - kernel_value(target, footprint, q);
+        const double away = profile.value(footprint, q) - kernel_value(target, footprint, q);
         if (q < profile.support()) samples.emplace_back(q, 2 * away);
         loss += away * away;
     }
@@ -140,7 +142,8 @@ TEST(ProfileOptimizer, finds_a_profile_that_it_is_drawn_towards_and_goes_on_from
     for (const Footprint footprint : kFootprints) {
         ProfileOptimizer optimizer(KERNEL_PARABOLIC, footprint, 0.3);
         // With the second moment of the start: the parabola's, not the cosine's.
-        const double support = 6.25 * kernel_psi(KERNEL_PARABOLIC) / kernel_psi(KERNEL_RAISED_COSINE);
+        const double support =
+            6.25 * kernel_psi(KERNEL_PARABOLIC) / kernel_psi(KERNEL_RAISED_COSINE);
         const int target = register_kernel("wide_cosine", support, [&](double q) {
             return kernel_value(KERNEL_RAISED_COSINE, Footprint::psi, q * 6.25 / support);
         });
@@ -174,8 +177,8 @@ TEST(ProfileOptimizer, nothing_and_what_is_not_finite_change_nothing) {
 }
 
 TEST(LearnedProfile, kernels_of_another_nature_are_refused_as_a_start) {
-    for (const int kernel : {int{KERNEL_BETA}, blend_of(KERNEL_GAUSSIAN, KERNEL_SINC),
-                             int{KERNEL_SINC_2_PULSES}}) {
+    for (const int kernel :
+         {int{KERNEL_BETA}, blend_of(KERNEL_GAUSSIAN, KERNEL_SINC), int{KERNEL_SINC_2_PULSES}}) {
         EXPECT_NE(LearnedProfile::fault_of_start(kernel), "") << kernel_name(kernel);
         EXPECT_THROW(LearnedProfile{kernel}, Error) << kernel_name(kernel);
     }
