@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // profile_gradient.comp and profile_sums.comp alone against the reference, and the reference's
 // gradient of a profile against its own central differences.
+#include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/learned_profile.h"
 #include "tests/support/blend_scene.h"
 #include "tests/support/compare_arrays.h"

@@ -486,7 +486,7 @@ void Trainer::restore(const State& s) {
     DARB_CHECK(s.model.origin == photos_.origin(), "splats of another origin than the cameras'");
     drain();
     if (step_.exposure() && !s.exposure.empty()) step_.exposure()->restore(s.exposure);
-    if (profile_) restore_profile(s.profile);
+    if (profile_ && !s.profile.empty()) restore_profile(s.profile);
     const std::uint32_t frozen = splats_.frozen();
     if (cameras_ && !s.cameras.empty()) {
         cameras_->restore(s.cameras);
