@@ -80,15 +80,15 @@ TEST(LearnedKernelRecovery, a_start_from_a_wrong_kernel_comes_nearer_to_that_of_
         scale += std::log(static_cast<float>(kernel_psi(KERNEL_PARABOLIC)));
     t.options.kernel = KERNEL_GAUSSIAN;
     t.options.footprint = Footprint::psi;
-    t.options.iterations = 120;
+    t.options.iterations = 96;
     t.options.sh_degree = 0;
     t.options.densify_until = 0;
     t.options.opacity_reset_interval = 1000;
-    t.options.learn_kernel = 12;
-    t.options.kernel_lr = 0.4f;
+    t.options.learn_kernel = 8;
+    t.options.kernel_lr = 0.5f;
     Trainer trainer(shared_device(), t.dataset, t.photos, start, t.options);
     const double before = apart(trainer.kernel(), KERNEL_PARABOLIC);
-    run_and_drain(trainer, 120);
+    run_and_drain(trainer, 96);
     EXPECT_LT(apart(trainer.kernel(), KERNEL_PARABOLIC), 0.6 * before);
 }
 
