@@ -269,7 +269,7 @@ const OptionRow kRows[] = {
      .member = &Opt::learn_kernel,
      .group = option_group::kScene,
      .help = "learn the kernel's profile beside the splats, from the one that --kernel names, in "
-             "this many changes over the run, such as 20; 0: it stays",
+             "this many changes over the run, such as 10; 0: it stays",
      .most = 500,
      .stands = learns_kernel},
     {.flags = "--kernel-lr",
