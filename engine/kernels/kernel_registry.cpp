@@ -15,7 +15,9 @@
 namespace darb {
 namespace {
 
-constexpr int kMostKernels = 1000;  // per process; a hostile folder of files could go on for ever
+// Per process; a hostile folder of files could go on for ever, and a run that learns its profile
+// registers one at each change.
+constexpr int kMostKernels = 10'000;
 // The largest error of a footprint's fit that may be drawn: more would be visible beside the
 // reference.
 constexpr double kDrawable = 1e-6;

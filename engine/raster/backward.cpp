@@ -48,6 +48,13 @@ Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, i
     return project_.emplace(key, Pipeline(*device_, "project_backward", constants)).first->second;
 }
 
+void Backward::set_kernel(int kernel) {
+    options_.kernel = kernel;
+    blend_.set_kernel(kernel);
+    project_.clear();
+    chunks_ = {};
+}
+
 void Backward::reserve(std::uint32_t splats, std::uint32_t intersections, std::uint32_t records) {
     if (splats > splat_capacity_ || splat_capacity_ == 0) {
         splat_capacity_ = 0;

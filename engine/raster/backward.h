@@ -29,6 +29,9 @@ class Backward {
   public:
     Backward(Device& device, const ForwardOptions& options);
 
+    /// As Forward::set_kernel; buffers and what they hold stay.
+    void set_kernel(int kernel);
+
     /// Makes buffers for so many splats, intersections and records (see BlendBackward::reserve).
     /// Never shrinks; 0 asks for no more of that kind. Where there are more splats, gradient_sum()
     /// starts at 0.

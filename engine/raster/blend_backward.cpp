@@ -93,6 +93,12 @@ void BlendBackward::make_pipelines(bool segmented) {
     bucket_behind_ = Pipeline(*device_, "bucket_behind", constants);
 }
 
+void BlendBackward::set_kernel(int kernel) {
+    options_.kernel = kernel;
+    blend_ = {};
+    make_pipelines(segmented_);
+}
+
 void BlendBackward::make_by_pixels(SpecConstants constants) {
     const std::uint32_t lanes = lanes_by_pixels(device_->info(), blend_subgroup(*device_));
     if (lanes == 0)

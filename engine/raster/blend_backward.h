@@ -17,6 +17,9 @@ class BlendBackward {
     /// one that the forward pass was made with.
     BlendBackward(Device& device, const ForwardOptions& options);
 
+    /// As Forward::set_kernel.
+    void set_kernel(int kernel);
+
     /// Makes the outputs fit; never shrinks. The queue must be idle. records: those of the frame's
     /// checkpoints, for which record() makes room where nobody did.
     void reserve(std::uint32_t intersections, std::uint32_t records = 0);

@@ -109,6 +109,14 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     emit_ = Pipeline(device, emits_slots_ ? "emit_slots" : "emit", of_splat);
 }
 
+// What names no kernel is shared with what there was, as pipelines with equal constants are one.
+void Forward::set_kernel(int kernel) {
+    DARB_CHECK(kernel_has_shape(kernel) == kernel_has_shape(options_.kernel), "kernel {}", kernel);
+    ForwardOptions options = options_;
+    options.kernel = kernel;
+    *this = Forward(*device_, options);
+}
+
 Pipeline& Forward::project_pipeline(int sh_degree, int sh_stored) {
     const auto found = project_.find({sh_degree, sh_stored});
     if (found != project_.end()) return found->second;

@@ -31,6 +31,9 @@ class Forward {
     /// Frames must be made with the same options.
     Forward(Device& device, const ForwardOptions& options);
     const ForwardOptions& options() const { return options_; }
+    /// Another kernel from now on, of splats without or with shapes as before. The queue must be
+    /// idle.
+    void set_kernel(int kernel);
 
     /// One frame: record_intersections, then record_blend. FrameBuffers::reserve comes before, for
     /// the splats and the size.

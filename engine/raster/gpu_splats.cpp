@@ -16,6 +16,11 @@ std::array<std::uint32_t, kAttributeCount> GpuSplats::strides(int sh_degree, int
     return floats;
 }
 
+void GpuSplats::set_kernel(int kernel) {
+    DARB_CHECK(strides(header_.sh_degree, kernel) == strides_, "kernel {}", kernel);
+    header_.kernel = kernel;
+}
+
 std::uint64_t GpuSplats::parameter_bytes(std::uint64_t count, int sh_degree, int kernel) {
     std::uint64_t bytes = 0;
     const std::array<std::uint32_t, kAttributeCount> all = strides(sh_degree, kernel);

@@ -28,6 +28,8 @@ class GpuSplats {
     std::uint32_t count() const { return count_; }
     int sh_degree() const { return header_.sh_degree; }
     int kernel() const { return header_.kernel; }
+    /// They are of this kernel from now on, with the same attributes.
+    void set_kernel(int kernel);
     Footprint footprint() const { return header_.footprint; }
     bool antialias() const { return header_.antialias; }
     const glm::dvec3& origin() const { return header_.origin; }

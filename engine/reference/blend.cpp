@@ -287,28 +287,61 @@ Vec3<T> background_of(const RenderSettings& settings) {
     return {T(settings.background[0]), T(settings.background[1]), T(settings.background[2])};
 }
 
-/// Goes back to front over the splats that a pixel blended. `behind` is the colour behind the splat
-/// and `open` the transmittance behind it, both as seen through nothing, so that there is no
-/// division by 1 - alpha.
+/// dL/d(image) at a pixel.
 template <class T>
+struct PixelGradient {
+    Vec3<T> colour;
+    T alpha, depth;
+};
+
+/// Goes back to front over the splats that a pixel blended and calls visit(blended, dL/dalpha).
+/// `behind` is the colour behind the splat and `open` the transmittance behind it, both as seen
+/// through nothing, so that there is no division by 1 - alpha.
+template <class T, class Visit>
 void pixel_backward(std::span<const ProjectedSplat<T>> list, std::span<const Blended<T>> blended,
-                    const Vec3<T>& d_colour, T d_alpha_out, T d_depth, const Vec3<T>& background,
-                    const KernelTable& kernel, ProjectedGradient<T>* intersections) {
+                    const PixelGradient<T>& d_pixel, const Vec3<T>& background,
+                    const Visit& visit) {
     Vec3<T> behind = background;
     T open = 1, depth_behind = 0;
     for (size_t i = blended.size(); i-- > 0;) {
         const Blended<T>& b = blended[i];
         const ProjectedSplat<T>& s = list[b.entry];
         const T alpha = b.sample.alpha;
-        const T d_alpha = b.before * (glm::dot(d_colour, s.colour - behind) + d_alpha_out * open +
-                                      d_depth * (s.depth - depth_behind));
-        intersections[b.entry].d_depth += d_depth * (b.before * alpha);
-        intersections[b.entry].d_colour += d_colour * (b.before * alpha);
-        add_sample_gradient(s, b.sample, d_alpha, kernel, intersections[b.entry]);
+        visit(b, b.before * (glm::dot(d_pixel.colour, s.colour - behind) + d_pixel.alpha * open +
+                             d_pixel.depth * (s.depth - depth_behind)));
         behind = alpha * s.colour + (1 - alpha) * behind;
         depth_behind = alpha * s.depth + (1 - alpha) * depth_behind;
         open *= 1 - alpha;
     }
+}
+
+/// Calls visit(splat, blended, dL/dalpha, gradient of the pixel) for all that a tile's pixels
+/// blended; returns dL/d(background).
+template <class T, class Visit>
+Vec3<T> tile_backward(const TileLists& lists, size_t tile,
+                      const std::vector<ProjectedSplat<T>>& list, const KernelTable& kernel,
+                      const RenderSettings& settings, const ImageGradient<T>& d_image,
+                      const Visit& visit) {
+    const Vec3<T> background = background_of<T>(settings);
+    std::vector<Blended<T>> blended;
+    Vec3<T> d_background(0);
+    const auto pixel = [&](int x, int y) {
+        blended.clear();
+        const T transmittance = walk_pixel<T>(list, x, y, kernel, settings,
+                                              [&](size_t k, const Sample<T>& sample, T before) {
+                                                  blended.push_back({k, sample, before});
+                                              });
+        const Image<T>&d_rgb = d_image.colour, &d_alpha = d_image.alpha;
+        const PixelGradient<T> d_pixel{
+            {d_rgb.at(x, y, 0), d_rgb.at(x, y, 1), d_rgb.at(x, y, 2)},
+            d_alpha.data.empty() ? T(0) : d_alpha.at(x, y, 0),
+            d_image.depth.data.empty() ? T(0) : d_image.depth.at(x, y, 0)};
+        d_background += d_pixel.colour * transmittance;
+        pixel_backward<T>(list, blended, d_pixel, background,
+                          [&](const Blended<T>& b, T d_blended) { visit(b, d_blended, d_pixel); });
+    };
+    for_each_pixel(lists, tile, d_image.colour.width, d_image.colour.height, pixel);
+    return d_background;
 }
 
 }  // namespace
@@ -345,25 +378,29 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                             const RenderSettings& settings, const ImageGradient<T>& d_image,
                             ProjectedGradient<T>* intersections) {
     const std::vector<ProjectedSplat<T>> list = gather(lists, tile, splats);
-    const Vec3<T> background = background_of<T>(settings);
-    std::vector<Blended<T>> blended;
-    Vec3<T> d_background(0);
-    const auto pixel = [&](int x, int y) {
-        blended.clear();
-        const T transmittance = walk_pixel<T>(list, x, y, kernel, settings,
-                                              [&](size_t k, const Sample<T>& sample, T before) {
-                                                  blended.push_back({k, sample, before});
-                                              });
-        const Image<T>&d_rgb = d_image.colour, &d_alpha = d_image.alpha;
-        const Vec3<T> d_pixel(d_rgb.at(x, y, 0), d_rgb.at(x, y, 1), d_rgb.at(x, y, 2));
-        const T d_out = d_alpha.data.empty() ? T(0) : d_alpha.at(x, y, 0);
-        const T d_depth = d_image.depth.data.empty() ? T(0) : d_image.depth.at(x, y, 0);
-        d_background += d_pixel * transmittance;
-        pixel_backward<T>(list, blended, d_pixel, d_out, d_depth, background, kernel,
-                          intersections);
-    };
-    for_each_pixel(lists, tile, d_image.colour.width, d_image.colour.height, pixel);
-    return d_background;
+    return tile_backward<T>(lists, tile, list, kernel, settings, d_image,
+                            [&](const Blended<T>& b, T d_alpha, const PixelGradient<T>& d_pixel) {
+                                ProjectedGradient<T>& to = intersections[b.entry];
+                                to.d_depth += d_pixel.depth * (b.before * b.sample.alpha);
+                                to.d_colour += d_pixel.colour * (b.before * b.sample.alpha);
+                                add_sample_gradient(list[b.entry], b.sample, d_alpha, kernel, to);
+                            });
+}
+
+template <class T>
+void add_tile_profile(const TileLists& lists, size_t tile,
+                      const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,
+                      const RenderSettings& settings, const ImageGradient<T>& d_image, T support,
+                      std::span<T> sums) {
+    const std::vector<ProjectedSplat<T>> list = gather(lists, tile, splats);
+    tile_backward<T>(lists, tile, list, kernel, settings, d_image,
+                     [&](const Blended<T>& b, T d_alpha, const PixelGradient<T>&) {
+                         if (b.sample.clamped) return;
+                         const T u = std::max(1 - b.sample.q / support, T(0));
+                         const T angle = std::acos(2 * std::sqrt(u) - 1);
+                         for (size_t k = 0; k < sums.size(); ++k)
+                             sums[k] += d_alpha * list[b.entry].opacity * std::cos(T(k) * angle);
+                     });
 }
 
 #define DARB_INSTANTIATE(T)                                                                   \
@@ -371,7 +408,10 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                              const KernelTable&, const RenderSettings&, BlendImages<T>&);     \
     template Vec3<T> blend_tile_backward(                                                     \
         const TileLists&, size_t, const std::vector<ProjectedSplat<T>>&, const KernelTable&,  \
-        const RenderSettings&, const ImageGradient<T>&, ProjectedGradient<T>*);
+        const RenderSettings&, const ImageGradient<T>&, ProjectedGradient<T>*);               \
+    template void add_tile_profile(                                                           \
+        const TileLists&, size_t, const std::vector<ProjectedSplat<T>>&, const KernelTable&,  \
+        const RenderSettings&, const ImageGradient<T>&, T, std::span<T>);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 #undef DARB_INSTANTIATE

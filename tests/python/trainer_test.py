@@ -38,7 +38,7 @@ OTHER = {
     "exposure_lr_init": 0.002, "exposure_lr_final": 0.0005, "white_background": True,
     "random_background": False, "resolution_ramp": "off", "lambda_dssim": 0.25,
     "position_lr_init": 0.0003, "position_lr_final": 0.00001, "scaling_lr": 0.004,
-    "rotation_lr": 0.002, "opacity_lr": 0.04, "shape_lr": 0.003, "feature_lr": 0.003,
+    "rotation_lr": 0.002, "opacity_lr": 0.04, "shape_lr": 0.003, "learn_kernel": 3, "kernel_lr": 0.3, "feature_lr": 0.003,
     "sh_rest_every": 2, "average_from": 0.5, "densify_from_iter": 1, "densify_until_iter": 5,
     "densification_interval": 2, "densify_grad_threshold": 0.0003, "percent_dense": 0.02,
     "prune_opacity": 0.01, "opacity_reset_interval": 4, "noise_lr": 1000.0,

@@ -108,6 +108,8 @@ inline testing::AssertionResult same_state(Trainer& a, Trainer& b) {
     if (one.rest_sum != two.rest_sum) return testing::AssertionFailure() << "sums of harmonics";
     if (one.averaged != two.averaged || one.mean != two.mean)
         return testing::AssertionFailure() << "means";
+    if (one.profile != two.profile || one.model.kernel != two.model.kernel)
+        return testing::AssertionFailure() << "profiles";
     if (one.cameras != two.cameras) return testing::AssertionFailure() << "cameras";
     if (one.gradient_sum != two.gradient_sum) return testing::AssertionFailure() << "gradient sums";
     return testing::AssertionSuccess();

@@ -144,6 +144,12 @@ TEST(MemoryPlan, refined_cameras_are_met_to_the_byte) {
     compare_to_the_byte(options, 4'000);
 }
 
+TEST(MemoryPlan, learned_kernels_are_met_to_the_byte) {
+    TrainOptions options = options_of(1);
+    options.learn_kernel = 2;
+    compare_to_the_byte(options, 4'000);
+}
+
 TEST(MemoryPlan, no_splats_are_met_to_the_byte) {
     compare_to_the_byte(options_of(1), 0);
 }

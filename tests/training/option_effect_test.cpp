@@ -37,6 +37,8 @@ const std::map<std::string, std::string> kOtherValues{
     {"/rotation_lr", "0.02"},
     {"/opacity_lr", "0.01"},
     {"/shape_lr", "0.2"},
+    {"/learn_kernel", "4"},
+    {"/kernel_lr", "0.5"},
     {"/sh_lr/0", "0.01"},
     {"/sh_rest_every", "3"},
     {"/position_lr_falls", "0.5"},
@@ -114,6 +116,7 @@ TinyTraining run_for(const OptionRow& row) {
     if (strategies == "budget") o.strategy = Strategy::budget;
     if (!strategies.empty() && !strategies.starts_with("adc")) o.max_splats = 80;
     if (key == "/shape_lr") o.kernel = KERNEL_BETA;
+    if (key == "/kernel_lr") o.learn_kernel = 4;
     if (key == "/random_points") t.dataset.points = {};
     return t;
 }
@@ -164,7 +167,8 @@ TEST(OptionEffect, another_value_of_each_option_trains_another_scene_long) {
                                 (special ? key : "") + (t.options.exposure ? "exposure" : "") +
                                 (t.dataset.views[0].depth.empty() ? "" : "depths") +
                                 (t.options.depth ? " compared" : "") +
-                                (t.options.refine_cameras ? "cameras" : "");
+                                (t.options.refine_cameras ? "cameras" : "") +
+                                (t.options.learn_kernel > 0 ? "learned" : "");
         if (!usual_of.contains(run)) usual_of[run] = trained(t);
         const std::optional<TrainerState>& usual = usual_of[run];
         ASSERT_TRUE(usual);

@@ -281,6 +281,8 @@ void check_for_blocks(const TrainRequest& r, const RunShown& shown) {
     refuse(r.refine_cameras == "on" || effect_in_words(r.effects, "cameras").value_or(false),
            "--refine-cameras",
            "Leave it out: each block would find another pose for the same photo.");
+    refuse(r.train.learn_kernel > 0, "--learn-kernel",
+           "Leave it out: each block would find another kernel, and one scene has one.");
 }
 
 }  // namespace

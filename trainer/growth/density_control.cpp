@@ -83,6 +83,10 @@ std::uint64_t DensityControl::fixed_bytes(int kernel) {
     return kernel_has_shape(kernel) ? SHAPE_ROWS * row : row;
 }
 
+void DensityControl::set_kernel(int kernel, Footprint footprint) {
+    quantile_.upload(radius_quantiles(kernel, footprint));
+}
+
 DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
                                   gpu::DensifyArgs args, std::uint32_t max_splats) {
     const std::uint32_t n = args.splat_count = splats.count();

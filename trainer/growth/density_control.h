@@ -44,6 +44,9 @@ class DensityControl {
 
     /// Device memory between rounds.
     static std::uint64_t fixed_bytes(int kernel);
+    /// Splits draw from this kernel from now on, which has shapes where the one before had. The
+    /// queue must be idle.
+    void set_kernel(int kernel, Footprint footprint);
 
     /// Every opacity down to at most `opacity`, its moments to zero.
     void reset_opacity(GpuSplats& splats, float opacity);

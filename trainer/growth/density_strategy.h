@@ -39,6 +39,9 @@ class DensityStrategy {
     /// Recorded after the optimizer's step. A frame that overflowed must change nothing.
     virtual void record_after_update(const StepFrame&) {}
 
+    /// The splats are of another kernel from now on. The queue is idle.
+    virtual void set_kernel(int) {}
+
     /// One round. Parameters, moments and the count of splats follow.
     virtual DensityResult round(const DensityRound& round) = 0;
 };

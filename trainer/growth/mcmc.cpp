@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "engine/core/rng.h"
 #include "engine/kernels/relocation_table.h"
@@ -55,7 +56,12 @@ class Mcmc : public DensityStrategy {
                                  schedule_.prune_opacity, random.next());
     }
 
+    // The table is made for the next round, and not at all where none follows.
+    void set_kernel(int kernel) override { next_kernel_ = kernel; }
+
     DensityResult round(const DensityRound& r) override {
+        if (next_kernel_) relocation_.set_kernel(*next_kernel_, schedule_.options.footprint);
+        next_kernel_.reset();
         const std::uint32_t count = r.splats.count();
         const std::uint32_t target = grow_by_share(schedule_, r.iteration, count, r.limit);
         return relocation_.run(r.splats, r.control, r.args.prune_opacity, target - count,
@@ -66,6 +72,7 @@ class Mcmc : public DensityStrategy {
     Schedule schedule_;
     double extent_;
     Relocation relocation_;
+    std::optional<int> next_kernel_;
 };
 
 }  // namespace
@@ -114,10 +121,12 @@ Relocation::Relocation(Device& device, int kernel, Footprint footprint)
     relocate["THREADS"] = SPLAT_GROUP;
     relocate_ = Pipeline(device, "relocate", relocate);
     noise_ = Pipeline(device, "position_noise", threads);
-    const std::vector<float> table =
-        relocation_table(kernel, footprint, RELOCATION_OPACITIES, RELOCATION_COUNTS);
     table_ = Buffer(device, "relocation table", device_bytes(kernel));
-    table_.upload(table);
+    set_kernel(kernel, footprint);
+}
+
+void Relocation::set_kernel(int kernel, Footprint footprint) {
+    table_.upload(relocation_table(kernel, footprint, RELOCATION_OPACITIES, RELOCATION_COUNTS));
 }
 
 std::uint64_t Relocation::device_bytes(int kernel) {

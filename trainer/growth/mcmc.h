@@ -13,6 +13,9 @@ class Relocation {
     /// The table of scales takes about 0.1 s, a second with a kernel that has shapes.
     Relocation(Device& device, int kernel, Footprint footprint);
 
+    /// Another table, of a kernel that has shapes where the one before had. The queue must be idle.
+    void set_kernel(int kernel, Footprint footprint);
+
     /// Device memory between rounds. A round takes a little less than one of DensityControl.
     static std::uint64_t device_bytes(int kernel);
 

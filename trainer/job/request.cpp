@@ -12,6 +12,7 @@
 #include "engine/core/files.h"
 #include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/kernels/learned_profile.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/plan/effect_plan.h"
 #include "trainer/job/request_options.h"
@@ -165,6 +166,11 @@ void check_request(const TrainRequest& request) {
         throw Error(fmt::format("--kernel {}", kernel_name(t.kernel)),
                     "goes with the footprint psi only",
                     "Leave --footprint out, or use another kernel, or --pulses 1.");
+    if (const std::string fault = LearnedProfile::fault_of_start(t.kernel);
+        t.learn_kernel > 0 && !fault.empty())
+        throw Error(fmt::format("--learn-kernel {}", t.learn_kernel),
+                    fmt::format("cannot start from --kernel {}: {}", kernel_name(t.kernel), fault),
+                    "Start from another kernel, such as gaussian, or leave --learn-kernel out.");
     if (request.refine_cameras != "auto" && request.refine_cameras != "on" &&
         request.refine_cameras != "off")
         throw Error("--refine-cameras " + request.refine_cameras, "is none of auto, on and off",
@@ -187,6 +193,11 @@ std::vector<std::string> unused_options(const TrainRequest& r) {
         !has_builtin_evaluation(kernel))
         notes.push_back(fmt::format("--evaluation builtin is not used: {} has polynomials only",
                                     kernel_name(kernel)));
+    if (was_given(r, "--evaluation") && r.train.accuracy.of(kEvaluation).name == "builtin" &&
+        has_builtin_evaluation(kernel) && r.train.learn_kernel > 0)
+        notes.push_back("--evaluation builtin is not used: a learned kernel has polynomials only");
+    if (was_given(r, "--kernel-lr") && r.train.learn_kernel == 0)
+        notes.push_back("--kernel-lr is not used: --learn-kernel gives the changes it is for");
     if (r.train.shape_lr && !kernel_has_shape(kernel))
         notes.push_back("--shape-lr is not used: splats have shapes of their own with --kernel " +
                         shaped_kernel_names());

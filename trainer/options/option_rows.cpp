@@ -26,6 +26,9 @@ bool refines_cameras(const Opt& o, const Sched&) {
 bool compares_depths(const Opt& o, const Sched&) {
     return o.depth;
 }
+bool learns_kernel(const Opt& o, const Sched&) {
+    return o.learn_kernel > 0;
+}
 // What the first strategy does not have stands only where it is, so that files from before it
 // agree.
 bool not_of_the_first(const Opt& o, const Sched&) {
@@ -261,6 +264,22 @@ const OptionRow kRows[] = {
      .usual = "0.004, times 4000 / iterations (at most 5) in shorter runs",
      .resolved = [](const Opt&, const Sched& s) -> Json { return s.first.shape; },
      .stands = [](const Opt& o, const Sched&) { return kernel_has_shape(o.kernel); }},
+    {.flags = "--learn-kernel",
+     .setting = "/learn_kernel",
+     .member = &Opt::learn_kernel,
+     .group = option_group::kScene,
+     .help = "learn the kernel's profile beside the splats, from the one that --kernel names, in "
+             "this many changes over the run, such as 10; 0: it stays",
+     .most = 500,
+     .stands = learns_kernel},
+    {.flags = "--kernel-lr",
+     .setting = "/kernel_lr",
+     .member = &Opt::kernel_lr,
+     .group = option_group::kRates,
+     .help = "how far a change of --learn-kernel moves the logarithms of the profile's weights",
+     .least = kAboveZero,
+     .most = 10,
+     .stands = learns_kernel},
     {.flags = "--feature-lr",
      .setting = "/sh_lr/0",
      .member = &Opt::sh_dc_lr,

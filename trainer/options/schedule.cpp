@@ -24,7 +24,8 @@ struct RampSize {
     double until;  // share of the run
 };
 constexpr RampSize kRampSizes[] = {{4, 0.1}, {2, 0.3}};
-constexpr int kSmallestSide = 100;  // px
+constexpr int kSmallestSide = 100;     // px
+constexpr int kKernelSampleEvery = 8;  // iterations
 // Drops of undrawn splats, in rounds of density control.
 constexpr int kRoundsADrop = 5;
 
@@ -94,6 +95,8 @@ Schedule::Schedule(const TrainOptions& o) : options(o), last(o.iterations), spee
     rounds.end = rounds_end(o);
     resets = resets_of(o, prune_opacity, rounds);
     average_begin = std::max(static_cast<int>(o.average_from * options.iterations), rounds.end);
+
+    kernel_end = std::max(std::min(average_begin, options.iterations), 1);
 
     // A kernel that covers less of the picture than a Gaussian has its lengths longer, learns its
     // scales faster, and gains from a limit of them; a Gaussian loses with one.
@@ -185,6 +188,22 @@ void Schedule::end_early(int iteration) {
     last = std::min(options.iterations,
                     iteration + std::max(1, static_cast<int>(iteration * of_mean)));
     average_begin = iteration;
+}
+
+bool Schedule::changes_kernel_after(int iteration) const {
+    if (options.learn_kernel == 0 || iteration <= 0 ||
+        iteration > std::min(kernel_end, average_begin))
+        return false;
+    const auto changes = [&](int until) {
+        return std::int64_t{until} * options.learn_kernel / kernel_end;
+    };
+    return changes(iteration) > changes(iteration - 1);
+}
+
+bool Schedule::samples_kernel_at(int iteration) const {
+    if (options.learn_kernel == 0 || iteration > std::min(kernel_end, average_begin)) return false;
+    const int every = std::max(kKernelSampleEvery, options.batch);
+    return (iteration - 1) % every == 0;
 }
 
 bool Schedule::drops_undrawn_after(int iteration) const {

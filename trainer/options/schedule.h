@@ -62,6 +62,13 @@ class Schedule {
     /// Nothing where its mean has begun. Rates stay as the whole run has them.
     void end_early(int iteration);
 
+    /// Whether the profile of the kernel changes after this iteration: options.learn_kernel times,
+    /// evenly, until the mean of the last splats begins.
+    bool changes_kernel_after(int iteration) const;
+    /// Whether the gradient of the profile is taken at an iteration, from 1: every eighth, or the
+    /// first of each batch that has one of these, as it moves slowly.
+    bool samples_kernel_at(int iteration) const;
+
     /// Whether splats go after this iteration that nothing draws any more: every so many iterations
     /// from the end of growth until the mean begins, which takes in the same splats throughout.
     bool drops_undrawn_after(int iteration) const;
@@ -109,6 +116,7 @@ class Schedule {
     double position_falls_for = 1;  // share of the run, then it stays
     double last_share = 1;          // what the other rates fall to over the second half
     int average_begin = 0;
+    int kernel_end = 0;       // the profile of a learned kernel changes until then
     double length_scale = 1;  // multiplies every length that options have for a Gaussian
     float largest_scale = 0;  // a splat's limit, over scene_reach() and length_scale; 0: none
 };

@@ -15,6 +15,9 @@
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/run_events.h"
+#include "engine/kernels/kernel_definition.h"
+#include "engine/kernels/kernel_registry.h"
+#include "engine/kernels/learned_profile.h"
 #include "engine/plan/tuner.h"
 #include "engine/raster/frame_view.h"
 #include "engine/scene/edit_splats.h"
@@ -98,6 +101,7 @@ class Run {
     }
     void save_model(int iteration);
     void write_cameras();
+    void write_kernel();
     void show_step();
     void save_checkpoint(const std::filesystem::path& path);
     void begin();
@@ -114,6 +118,7 @@ class Run {
     void report_probes();
     void look_at_forms();
     void report_cameras();
+    void report_kernel();
     double seconds() const {
         return seconds_ +
                (running_ ? std::chrono::duration<double>(Clock::now() - started_).count() : 0);
@@ -246,7 +251,15 @@ void Run::save_model(int iteration) {
     if (const auto maps = trainer_.exposures(); !maps.empty())
         write_file_atomic(run_.output / "exposure.json", exposure_text(maps));
     if (trainer_.camera_moves()) write_cameras();
+    if (schedule_.options.learn_kernel > 0) write_kernel();
     stopwatch(true);
+}
+
+// A file for --kernel-file.
+void Run::write_kernel() {
+    const KernelDefinition* learned = kernel_definition(trainer_.kernel());
+    DARB_CHECK(learned != nullptr, "kernel {}", trainer_.kernel());
+    write_file_atomic(run_.output / "kernel.json", definition_json(*learned).dump(1) + "\n");
 }
 
 // As they are trained now.
@@ -299,6 +312,11 @@ void Run::begin() {
     } else {
         set_aside(run_.output);
         log_.begin();
+        if (const TrainOptions& o = schedule_.options; o.learn_kernel > 0)
+            progress_.note(
+                fmt::format("the kernel's profile is learned; the one that it starts from is off "
+                            "{} by {:.4f} at most",
+                            kernel_name(o.kernel), LearnedProfile(o.kernel).distance_from_start()));
         if (run_.write_start) run_.write_start(run_.output / "dense_start");
     }
     write_cameras();
@@ -329,6 +347,7 @@ TrainResult Run::execute(const std::atomic<bool>* stop) {
     if (summary_.interrupted) save_what_is_there(false);
     report_troubles();
     report_cameras();
+    report_kernel();
     progress_.finish();
     summary_.iteration = trainer_.iteration();
     summary_.seconds = seconds_;
@@ -524,6 +543,14 @@ void Run::report_cameras() {
         "{:.3f} degrees; focal lengths by up to {:.2f} %, principal points by {:.2f} px",
         m->cameras, m->median_px, m->median_degrees, m->largest_px, m->largest_degrees,
         100 * m->largest_focal, m->largest_centre_px));
+}
+
+void Run::report_kernel() {
+    if (schedule_.options.learn_kernel == 0) return;
+    const int kernel = trainer_.kernel();
+    progress_.note(fmt::format(
+        "the kernel became {}, of support {:.3g}: darb psi --kernel-file {} shows it",
+        kernel_name(kernel), kernel_support(kernel), (run_.output / "kernel.json").string()));
 }
 
 void Run::report_troubles() {

@@ -23,10 +23,10 @@ constexpr const char* kOtherFolder = "Name another output folder with -o.";
 constexpr const char* kHolder = "process ";
 constexpr const char* kNobody = "another process";
 constexpr size_t kLongestHolder = 512;  // bytes of the lock file that are shown
-constexpr std::array<std::string_view, 14> kRunNames{
+constexpr std::array<std::string_view, 15> kRunNames{
     "checkpoint.darb", "metrics.json", "exposure.json", "report.html",  "run.jsonl",
-    "cameras.json",    "cfg_args",     "command.json",  "request.json", "point_cloud",
-    "held_out",        "scene.html",   "dense_start",   "blocks"};
+    "cameras.json",    "kernel.json",  "cfg_args",      "command.json", "request.json",
+    "point_cloud",     "held_out",     "scene.html",    "dense_start",  "blocks"};
 
 bool is_numbered(const std::string& name, std::string_view before, std::string_view behind) {
     if (name.size() <= before.size() + behind.size() || !name.starts_with(before) ||

@@ -13,6 +13,8 @@
 #include "engine/core/text.h"
 #include "engine/data/image_io.h"
 #include "engine/data/run_events.h"
+#include "engine/kernels/kernel_definition.h"
+#include "engine/kernels/kernel_registry.h"
 #include "engine/plan/tuner.h"
 #include "trainer/options/schedule.h"
 #include "trainer/options/strategy.h"
@@ -391,6 +393,9 @@ std::filesystem::path RunLog::finish(const TrainResult& summary, const Trainer& 
                  {"sh_probes", probes_of(events_)},
                  {"sh_degree", trainer.sh_degree()},
                  {"evaluations", evaluations}};
+    if (trainer.schedule().options.learn_kernel > 0)
+        if (const KernelDefinition* own = kernel_definition(trainer.kernel()))
+            metrics["kernel_definition"] = definition_json(*own);
     if (!summary.ended_early.empty()) metrics["ended_early"] = summary.ended_early;
     if (const std::optional<CameraMoves> m = trainer.camera_moves())
         metrics["cameras"] = {{"refined", m->cameras},

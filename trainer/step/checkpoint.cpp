@@ -46,6 +46,7 @@ void for_each_array(State& state, Visit visit) {
     visit(state.smoothing);
     visit(state.exposure);
     visit(state.cameras);
+    visit(state.profile);
     for (auto& values : state.mean) visit(values);
 }
 
@@ -102,6 +103,7 @@ Json header_of(const Checkpoint& c) {
                 {"most_pairs", n.most_intersections}};
     if (const KernelDefinition* own = kernel_definition(m.kernel))
         header["kernel_definition"] = definition_json(*own);
+    if (!c.state.profile.empty()) header["profile"] = c.state.profile.size();
     if (!c.gain.looks.empty()) header["gain"] = gain_json(c.gain);
     return header;
 }
@@ -246,7 +248,7 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     if (header_bytes > file.size() - kHeadBytes) throw fail("truncated in the header");
     const auto* text = reinterpret_cast<const char*>(file.data() + kHeadBytes);
     Checkpoint c;
-    std::uint64_t splats = 0, smoothing = 0, exposure = 0, cameras = 0, rest = 0;
+    std::uint64_t splats = 0, smoothing = 0, exposure = 0, cameras = 0, profile = 0, rest = 0;
     try {
         const Json header = Json::parse(text, text + header_bytes);
         read_header(header, c, where);
@@ -256,17 +258,19 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
         if (header.value("error_shares", std::uint64_t{0}) != 0)
             throw fail("it is of the strategy budget of an earlier version, by the photos' error");
         cameras = header.value("cameras", std::uint64_t{0});
+        profile = header.value("profile", std::uint64_t{0});
         rest = header.value("rest_sum", std::uint64_t{0});
         const auto rest_floats = static_cast<std::uint64_t>(c.state.model.rest_count());
         if ((smoothing != 0 && smoothing != splats) || exposure > kMaxSplats ||
-            cameras > kMaxSplats || (rest != 0 && rest != rest_floats * splats))
+            cameras > kMaxSplats || profile > kMaxSplats ||
+            (rest != 0 && rest != rest_floats * splats))
             throw fail("the header's sizes make no sense");
     } catch (const Json::exception& e) {
         throw fail("its header " + json_reason(e));
     }
     const std::span<const std::byte> payload = file.subspan(kHeadBytes + header_bytes);
     const std::uint64_t floats =
-        splats * floats_per_splat(c.state) + smoothing + exposure + cameras + rest;
+        splats * floats_per_splat(c.state) + smoothing + exposure + cameras + profile + rest;
     const std::uint64_t expected = floats * sizeof(float);
     if (payload.size() != expected)
         throw fail(fmt::format("{} bytes of data for {} splats, {} expected: truncated",
@@ -277,6 +281,7 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     c.state.smoothing.resize(smoothing);
     c.state.exposure.resize(exposure);
     c.state.cameras.resize(cameras);
+    c.state.profile.resize(profile);
     c.state.rest_sum.resize(rest);
     size_t at = 0;
     for_each_array(c.state, [&](std::vector<float>& values) {
@@ -349,7 +354,8 @@ std::string contradiction(const Checkpoint& checkpoint, const Schedule& schedule
     const TrainOptions& o = schedule.options;
     const TrainerState& s = checkpoint.state;
     const SplatModel& m = s.model;
-    if (m.kernel != o.kernel || m.footprint != o.footprint)
+    const bool learns = o.learn_kernel > 0;  // and so goes away from its kernel
+    if ((m.kernel != o.kernel && !learns) || m.footprint != o.footprint)
         return fmt::format(
             "holds splats of the kernel {} with the footprint {}, the run trains {} "
             "with {}",
@@ -366,6 +372,7 @@ std::string contradiction(const Checkpoint& checkpoint, const Schedule& schedule
          (!o.exposure || s.exposure.size() !=
                              exposure_maps(o, static_cast<std::uint32_t>(photos)).state_size())) ||
         (!s.cameras.empty() && !o.refine_cameras) ||
+        s.profile.size() != (learns ? kProfileFloats : 0) ||
         (!s.rest_sum.empty() && schedule.rest_every <= 1))
         return "holds what the run's effects and strategy have no use for";
     if (const std::string what = gain_contradiction(checkpoint.gain, s.iteration, schedule);

@@ -10,6 +10,7 @@
 #include "engine/raster/frame_view.h"
 #include "engine/raster/gpu_splats.h"
 #include "engine/raster/loss.h"
+#include "engine/raster/profile_sums.h"
 #include "trainer/growth/density_control.h"
 #include "trainer/growth/predicted_growth.h"
 #include "trainer/options/schedule.h"
@@ -88,6 +89,7 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     const FrameSize size = frame_size(device, demand);
     FrameBytes bytes = FrameBuffers::device_bytes(device, demand.frame, size);
     bytes += Backward::device_bytes(size);
+    if (demand.profile) bytes += ProfileSums::device_bytes(size);
     MemoryPlan plan;
     plan.parameters =
         GpuSplats::parameter_bytes(demand.splats, demand.sh_degree, demand.frame.kernel);
@@ -180,6 +182,7 @@ void add_photos(const std::vector<View>& views, const Schedule& schedule, Memory
     demand.batch = options.batch;
     demand.by_views = steps_by_views(options);
     demand.cameras = options.refine_cameras;
+    demand.profile = options.learn_kernel > 0;
     const std::vector<RampStep> steps = schedule.ramp_steps(std::max(demand.width, demand.height));
     if (steps.empty()) return;
     for (const View& view : views) {

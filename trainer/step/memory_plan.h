@@ -43,6 +43,7 @@ struct MemoryDemand {
     int batch = 1;
     bool by_views = false;  // steps_by_views()
     bool cameras = false;   // are refined
+    bool profile = false;   // the kernel's profile is learned
     // The resolution ramp's smaller photos: all training photos together, those with depths counted
     // twice, and their cameras.
     std::uint64_t small_pixels = 0;

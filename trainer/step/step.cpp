@@ -88,6 +88,14 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& ph
     if (options.depth) depth_.emplace(device, loss.use_alpha, options.exposure);
     if (steps_by_views(options)) adam_.emplace(device);
     if (options.refine_cameras) cameras_.emplace(device);
+    if (options.learn_kernel > 0) profile_.emplace(device, forward_options(options));
+}
+
+void TrainingStep::set_kernel(int kernel) {
+    drain();
+    forward_.set_kernel(kernel);
+    backward_.set_kernel(kernel);
+    if (profile_) profile_->set_kernel(kernel);
 }
 
 void TrainingStep::reserve(int width, int height) {
@@ -99,6 +107,7 @@ void TrainingStep::reserve_backward() {
     backward_.reserve(splats_->count(), buffers_.size().intersections,
                       buffers_.frame().checkpoint_records());
     if (cameras_) cameras_->reserve(buffers_.size().splats);
+    if (profile_) profile_->reserve(buffers_.size());
 }
 
 bool TrainingStep::make_room(const gpu::FrameStatus& status) {
@@ -182,6 +191,7 @@ void TrainingStep::record_back(Commands& commands, const StepInput& input) {
                        {frame.images.image, frame.images.final_transmittance, *view.pixels,
                         d_image_, view.measured},
                        view.size(), depth_weight_, photos_->usual_depth());
+    if (input.samples_profile) profile_->record(commands, view.frame, frame, d_image_);
     if (input.gradients) {
         backward_.record_gradients(
             commands, view.frame, frame, *splats_, d_image_,

@@ -22,6 +22,7 @@
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/loss.h"
+#include "engine/raster/profile_sums.h"
 #include "engine/render/render_gradients.h"
 #include "trainer/growth/density_strategy.h"
 #include "trainer/step/exposure.h"
@@ -75,6 +76,7 @@ struct StepInput {
     float exposure_rate = 0;
     int exposure_visits = 1;              // visits of this photo, including this step
     DensityStrategy* strategy = nullptr;  // that records into the step
+    bool samples_profile = false;         // its sums for the gradient of a learned kernel are taken
     // In a batch: where the view's gradients go instead of a step, and which view of it this is.
     GradientBuffers* gradients = nullptr;
     int place = 0;
@@ -139,6 +141,11 @@ class TrainingStep {
     void restore_gradient_sum(const std::vector<float>& values);
     void clear_gradient_sum();
 
+    /// The steps that follow are of another kernel.
+    void set_kernel(int kernel);
+    /// Of the frames that took part since they were cleared; only with options.learn_kernel.
+    ProfileSums& profile() { return profile_.value(); }
+
     std::optional<Exposure>& exposure() { return exposure_; }
     /// What the buffers of a frame are made for now.
     const FrameSize& frame_size() const { return buffers_.size(); }
@@ -180,8 +187,9 @@ class TrainingStep {
     std::optional<Exposure> exposure_;  // options.exposure
     std::optional<DepthLoss> depth_;    // options.depth
     float depth_weight_;
-    std::optional<AdamUpdate> adam_;     // used for batches
-    std::optional<CameraSums> cameras_;  // options.refine_cameras, of batches
+    std::optional<AdamUpdate> adam_;      // used for batches
+    std::optional<CameraSums> cameras_;   // options.refine_cameras, of batches
+    std::optional<ProfileSums> profile_;  // options.learn_kernel
     Buffer d_image_;
     Buffer given_d_image_;  // [3][H][W] of picture_gradient
     std::array<Flight, 2> flights_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <span>
 #include <utility>
@@ -93,6 +94,11 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
     if (schedule.options.morton_order) morton_.emplace(device);
     if (schedule.options.refine_cameras) cameras_.emplace(dataset, schedule.options);
     if (steps_by_views(schedule.options)) tree_.emplace(device, schedule.options.batch);
+    if (schedule.options.learn_kernel > 0) {
+        profile_.emplace(schedule.options.kernel, schedule.options.footprint,
+                         schedule.options.kernel_lr);
+        use_kernel(profile_->kernel());
+    }
     set_resolution(1);
     update_smoothing();
     step_.reserve(photos_.largest_width(), photos_.largest_height());
@@ -141,6 +147,7 @@ void Trainer::step() {
 
 void Trainer::run_step() {
     StepInput input = input_for(iteration_ + 1, order_.view(iteration_ + 1), iteration_ + 1);
+    input.samples_profile = schedule_.samples_kernel_at(iteration_ + 1);
     if (photos_.stream()) input.next_view = order_.view(iteration_ + 2);
     if (step_.picture_gradient) step_.run(input);
     ++iteration_;
@@ -153,6 +160,7 @@ void Trainer::run_batch() {
     for (int i = iteration_ + 1; i <= end; ++i) {
         views.push_back(input_for(i, order_.view(i), end));
         views.back().place = i - iteration_ - 1;
+        views.back().samples_profile = views.back().place == 0 && schedule_.samples_kernel_at(i);
     }
     const std::vector<StepOutcome> outcomes =
         run_batch_step(step_, *tree_, splats_, views, *ranks_.all, schedule_.options.batch);
@@ -184,7 +192,10 @@ std::optional<CameraMoves> Trainer::camera_moves() const {
 }
 
 void Trainer::open_step() {
-    if (turns_.controlled != iteration_) turns_.round = control_density();
+    if (turns_.controlled != iteration_) {
+        turns_.round = control_density();
+        change_kernel();
+    }
     turns_.controlled =
         iteration_;  // a probe that fails is tried again, the round before it is not
     update_smoothing();
@@ -194,6 +205,33 @@ void Trainer::open_step() {
     const std::optional<DensityResult> round = std::exchange(turns_.round, std::nullopt);
     if ((round || probes) && ranks_.mixed) follow_first();
     if (round && on_round) on_round(iteration_, *round);
+}
+
+// The first rank has the first view of each batch, whose sums alone are taken.
+void Trainer::change_kernel() {
+    const int begin = schedule_.step_begin(iteration_);
+    if (last_in(begin, iteration_, [&](int i) { return schedule_.changes_kernel_after(i); }) == 0)
+        return;
+    drain();
+    std::vector<float> sums = step_.profile().read();
+    if (ranks_.several()) {
+        const auto bytes = std::as_bytes(std::span(sums));
+        const Bytes first = from_first(*ranks_.all, Bytes(bytes.begin(), bytes.end()));
+        std::memcpy(sums.data(), first.data(), std::min(first.size(), bytes.size()));
+    }
+    step_.profile().clear();
+    profile_->step(sums);
+    use_kernel(profile_->kernel());
+}
+
+// Lengths and rates stay those of the kernel at the start, as psi does.
+void Trainer::use_kernel(int kernel) {
+    if (kernel == splats_.kernel()) return;
+    drain();
+    splats_.set_kernel(kernel);
+    step_.set_kernel(kernel);
+    density_.set_kernel(kernel, schedule_.options.footprint);
+    strategy_->set_kernel(kernel);
 }
 
 void Trainer::set_picture_gradient(std::function<ImageF(const TrainingPicture&)> gradient) {
@@ -420,6 +458,11 @@ Trainer::State Trainer::state() {
     if (smoothing_) s.smoothing = splats_.smoothing().download<float>(splats_.count());
     if (step_.exposure()) s.exposure = step_.exposure()->state();
     if (cameras_) s.cameras = cameras_->state();
+    if (profile_) {
+        s.profile = profile_->state();
+        const std::vector<float> sums = step_.profile().read();
+        s.profile.insert(s.profile.end(), sums.begin(), sums.end());
+    }
     for (int a = 0; a < kAttributeCount; ++a) s.moments.push_back(splats_.download_moments(a));
     s.rest_sum = splats_.download_rest_sum();
     s.gradient_sum = step_.gradient_sum_values();
@@ -429,11 +472,21 @@ Trainer::State Trainer::state() {
     return s;
 }
 
+// s.profile; the splats that are there follow, so that those of the state are of the same kernel.
+void Trainer::restore_profile(const std::vector<float>& state) {
+    const auto own =
+        static_cast<std::ptrdiff_t>(std::min(state.size(), ProfileOptimizer::kStateFloats));
+    profile_->restore({state.begin(), state.begin() + own});
+    step_.profile().write({state.begin() + own, state.end()});
+    use_kernel(profile_->kernel());
+}
+
 void Trainer::restore(const State& s) {
     check_state(s);
     DARB_CHECK(s.model.origin == photos_.origin(), "splats of another origin than the cameras'");
     drain();
     if (step_.exposure() && !s.exposure.empty()) step_.exposure()->restore(s.exposure);
+    if (profile_ && !s.profile.empty()) restore_profile(s.profile);
     const std::uint32_t frozen = splats_.frozen();
     if (cameras_ && !s.cameras.empty()) {
         cameras_->restore(s.cameras);
@@ -442,6 +495,7 @@ void Trainer::restore(const State& s) {
     splats_ = GpuSplats();  // first, so that there are never two
     splats_ = GpuSplats(*device_, s.model, true, schedule_.rest_every > 1);
     splats_.freeze(frozen);
+    if (profile_) splats_.set_kernel(profile_->kernel());
     probe_.set_next(s.next_probe);
     if (smoothing_) {
         smoothing_->update(splats_);

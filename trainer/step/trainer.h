@@ -18,6 +18,7 @@
 #include "engine/core/image.h"
 #include "engine/core/rng.h"
 #include "engine/data/dataset.h"
+#include "engine/kernels/learned_profile.h"
 #include "trainer/growth/density_control.h"
 #include "trainer/growth/density_strategy.h"
 #include "trainer/step/batch_step.h"
@@ -128,6 +129,8 @@ class Trainer {
     glm::vec3 background() const {
         return glm::vec3(schedule_.options.white_background ? 1.0f : 0.0f);
     }
+    /// KERNEL_* of the splats now, which changes where its profile is learned.
+    int kernel() const { return splats_.kernel(); }
     /// What the sides of the photos are divided by now: 1 without a resolution ramp.
     int resolution_divisor() const { return photos_.divisor(); }
     /// Whether the device had no room for the mean that the run was to end with.
@@ -175,6 +178,9 @@ class Trainer {
     std::optional<DensityResult> drop_undrawn();
     DensityResult end_round(const DensityResult& result);
     void open_step();
+    void change_kernel();
+    void use_kernel(int kernel);
+    void restore_profile(const std::vector<float>& state);
     void follow_first();
     gpu::DensifyArgs round_args(int iteration) const;
     void reorder();
@@ -210,6 +216,7 @@ class Trainer {
     } turns_;
     std::optional<GradientTree> tree_;         // steps_by_views()
     std::optional<CameraRefinement> cameras_;  // options.refine_cameras
+    std::optional<ProfileOptimizer> profile_;  // options.learn_kernel
     TrainingStep step_;  // last: it waits for the device before anything that it uses goes
 };
 

@@ -31,6 +31,7 @@ void check_state(const TrainerState& state) {
     }
     check("smoothing", state.smoothing.size(), model.size(), true);
     check("sum of sh_rest", state.rest_sum.size(), model.sh_rest.size(), true);
+    check("profile", state.profile.size(), kProfileFloats, true);
     check("sum of gradients", state.gradient_sum.size(), 2 * model.size(), true);
 }
 

@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/kernels/learned_profile.h"
 #include "engine/scene/splat_model.h"
+#include "shaders/shared/profile_args.h"
 #include "shaders/shared/render_args.h"
 
 namespace darb {
@@ -24,6 +26,9 @@ struct TrainCounters {
     std::array<std::uint64_t, CULL_REASONS> culled{};  // summed over frames, by reason
 };
 
+/// Floats of TrainerState::profile where a kernel is learned.
+constexpr std::size_t kProfileFloats = ProfileOptimizer::kStateFloats + PROFILE_SUMS;
+
 /// moments: [attribute][2 N stride].
 struct TrainerState {
     int iteration = 0;
@@ -31,6 +36,7 @@ struct TrainerState {
     std::vector<float> smoothing;  // [N], or empty where the effect is off
     std::vector<float> exposure;   // Exposure::state(), or empty
     std::vector<float> cameras;    // CameraRefinement::state(), or empty
+    std::vector<float> profile;    // ProfileOptimizer::state() and sums of ProfileSums, or empty
     SplatModel model;
     std::vector<std::vector<float>> moments;
     std::vector<float> rest_sum;           // [N][stride of kShRest]; empty where there is none

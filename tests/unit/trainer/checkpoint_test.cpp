@@ -86,6 +86,7 @@ class CheckpointFile : public testing::Test {
 TEST_F(CheckpointFile, what_is_written_comes_back) {
     for (const size_t splats : {size_t{0}, size_t{1}, size_t{7}}) {
         Checkpoint c = checkpoint(splats);
+        c.state.profile.assign(kProfileFloats, 0.375f);
         c.gain = {{{100, 25.1}, {200, 25.0 + 1 / 3.}}, 300};
         written(c);
         const Checkpoint back = read_checkpoint(path_);
@@ -96,6 +97,7 @@ TEST_F(CheckpointFile, what_is_written_comes_back) {
         EXPECT_EQ(back.state.mean, c.state.mean);
         EXPECT_EQ(back.state.averaged, 6U);
         EXPECT_EQ(back.state.gradient_sum, c.state.gradient_sum);
+        EXPECT_EQ(back.state.profile, c.state.profile);
         EXPECT_EQ(back.state.model.origin, c.state.model.origin);
         EXPECT_EQ(back.state.model.kernel, KERNEL_SINC);
         EXPECT_EQ(back.state.model.footprint, Footprint::exact);

@@ -216,6 +216,10 @@ TEST_F(OptionNames, what_is_asked_for_in_vain_is_noted) {
     EXPECT_EQ(notes({}), "");
     EXPECT_NE(notes({{"shape_lr", "0.1"}}).find("--shape-lr is not used"), std::string::npos);
     EXPECT_EQ(notes({{"shape_lr", "0.1"}, {"kernel", "beta"}}), "");
+    EXPECT_NE(notes({{"kernel_lr", "0.1"}}).find("--kernel-lr is not used"), std::string::npos);
+    EXPECT_EQ(notes({{"kernel_lr", "0.1"}, {"learn_kernel", "9"}}), "");
+    EXPECT_NE(notes({{"evaluation", "builtin"}, {"learn_kernel", "9"}}).find("polynomials only"),
+              std::string::npos);
     EXPECT_NE(notes({{"iterations", "7"}, {"save_iterations", "9"}})
                   .find("--save-iterations 9 is beyond the end at 7"),
               std::string::npos);

@@ -50,6 +50,7 @@ TEST(OptionTable, each_flag_that_changes_a_result_changes_its_setting_alone) {
         if (std::string(row.strategies) == "mcmc") options.strategy = Strategy::mcmc;
         if (std::string(row.strategies) == "budget") options.strategy = Strategy::budget;
         if (name == "--shape-lr") options.kernel = KERNEL_BETA;
+        if (name == "--kernel-lr") options.learn_kernel = 3;
         if (name.starts_with("--camera-")) options.refine_cameras = true;
         if (name == "--depth-weight") options.depth = true;
         const Json before = settings_json(options);

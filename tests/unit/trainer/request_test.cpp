@@ -170,6 +170,13 @@ TEST_F(Request, of_things_that_contradict_each_other_is_refused) {
     r.schedule = "3dgs";
     r.train.strategy = *strategy_from_name("mcmc");
     EXPECT_THROW(check_request(r), Error);
+    r = {};
+    r.train.learn_kernel = 5;
+    EXPECT_NO_THROW(check_request(r));
+    r.train.kernel = KERNEL_BETA;
+    EXPECT_THROW(check_request(r), Error);
+    r.train.kernel = KERNEL_SINC_2_PULSES;
+    EXPECT_THROW(check_request(r), Error);
 }
 
 }  // namespace

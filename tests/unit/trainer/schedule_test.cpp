@@ -294,6 +294,32 @@ TEST(Given, counts_and_what_is_absent_is_of_the_strategy) {
     EXPECT_EQ(Schedule(o).rest_every, 3);
 }
 
+TEST(LearnedKernel, changes_so_often_until_the_mean_begins) {
+    TrainOptions options;
+    options.iterations = 1'600;
+    const auto changes = [&](int end) {
+        const Schedule schedule(options);
+        int count = 0;
+        for (int i = 0; i <= end; ++i) count += schedule.changes_kernel_after(i);
+        return count;
+    };
+    EXPECT_EQ(changes(1'600), 0);
+    options.learn_kernel = 20;
+    const Schedule schedule(options);
+    EXPECT_EQ(schedule.kernel_end, schedule.average_begin);
+    EXPECT_EQ(changes(1'600), 20);
+    EXPECT_EQ(changes(schedule.average_begin / 2), 10);
+    EXPECT_TRUE(schedule.samples_kernel_at(1));
+    EXPECT_FALSE(schedule.samples_kernel_at(2));
+    EXPECT_FALSE(schedule.samples_kernel_at(1'593)) << "nothing changes by it";
+    Schedule sooner(options);
+    sooner.end_early(400);
+    EXPECT_FALSE(sooner.changes_kernel_after(schedule.average_begin));
+    options.iterations = 7;  // more changes than iterations: one after each
+    options.average_from = 1;
+    EXPECT_EQ(changes(7), 7);
+}
+
 TEST(Schedule, steps_of_a_batch_begin_at_its_multiples_and_end_with_the_run) {
     TrainOptions o;
     o.iterations = 21;
