@@ -287,26 +287,36 @@ Vec3<T> background_of(const RenderSettings& settings) {
     return {T(settings.background[0]), T(settings.background[1]), T(settings.background[2])};
 }
 
+/// dL/d(colour, 1 - T, sum of T alpha depth, sum of T alpha depth^2) of a pixel.
+template <class T>
+struct PixelGradient {
+    Vec3<T> colour;
+    T alpha = 0, depth = 0, square = 0;
+};
+
 /// Goes back to front over the splats that a pixel blended. `behind` is the colour behind the splat
 /// and `open` the transmittance behind it, both as seen through nothing, so that there is no
 /// division by 1 - alpha.
 template <class T>
 void pixel_backward(std::span<const ProjectedSplat<T>> list, std::span<const Blended<T>> blended,
-                    const Vec3<T>& d_colour, T d_alpha_out, T d_depth, const Vec3<T>& background,
-                    const KernelTable& kernel, ProjectedGradient<T>* intersections) {
+                    const PixelGradient<T>& d, const Vec3<T>& background, const KernelTable& kernel,
+                    ProjectedGradient<T>* intersections) {
     Vec3<T> behind = background;
-    T open = 1, depth_behind = 0;
+    T open = 1, depth_behind = 0, square_behind = 0;
     for (size_t i = blended.size(); i-- > 0;) {
         const Blended<T>& b = blended[i];
         const ProjectedSplat<T>& s = list[b.entry];
         const T alpha = b.sample.alpha;
-        const T d_alpha = b.before * (glm::dot(d_colour, s.colour - behind) + d_alpha_out * open +
-                                      d_depth * (s.depth - depth_behind));
-        intersections[b.entry].d_depth += d_depth * (b.before * alpha);
-        intersections[b.entry].d_colour += d_colour * (b.before * alpha);
+        const T square = s.depth * s.depth;
+        const T d_alpha =
+            b.before * (glm::dot(d.colour, s.colour - behind) + d.alpha * open +
+                        d.depth * (s.depth - depth_behind) + d.square * (square - square_behind));
+        intersections[b.entry].d_depth += (d.depth + 2 * d.square * s.depth) * (b.before * alpha);
+        intersections[b.entry].d_colour += d.colour * (b.before * alpha);
         add_sample_gradient(s, b.sample, d_alpha, kernel, intersections[b.entry]);
         behind = alpha * s.colour + (1 - alpha) * behind;
         depth_behind = alpha * s.depth + (1 - alpha) * depth_behind;
+        square_behind = alpha * square + (1 - alpha) * square_behind;
         open *= 1 - alpha;
     }
 }
@@ -320,12 +330,14 @@ void blend_tile(const TileLists& lists, size_t tile, const std::vector<Projected
     const Vec3<T> background = background_of<T>(settings);
     const auto blend_pixel = [&](int x, int y) {
         Vec3<T> colour(0);
-        T depth = 0;
+        T depth = 0, square = 0;
         std::int32_t count = 0;
         const T transmittance = walk_pixel<T>(list, x, y, kernel, settings,
                                               [&](size_t k, const Sample<T>& sample, T before) {
                                                   colour += before * sample.alpha * list[k].colour;
-                                                  depth += before * sample.alpha * list[k].depth;
+                                                  const T z = list[k].depth;
+                                                  depth += before * sample.alpha * z;
+                                                  square += before * sample.alpha * z * z;
                                                   ++count;
                                               });
         colour += transmittance * background;
@@ -334,6 +346,7 @@ void blend_tile(const TileLists& lists, size_t tile, const std::vector<Projected
         }
         images.transmittance.at(x, y, 0) = transmittance;
         images.depth.at(x, y, 0) = depth;
+        if (!images.square.data.empty()) images.square.at(x, y, 0) = square;
         images.contributions.at(x, y, 0) = count;
     };
     for_each_pixel(lists, tile, images.colour.width, images.colour.height, blend_pixel);
@@ -354,13 +367,13 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                                               [&](size_t k, const Sample<T>& sample, T before) {
                                                   blended.push_back({k, sample, before});
                                               });
-        const Image<T>&d_rgb = d_image.colour, &d_alpha = d_image.alpha;
-        const Vec3<T> d_pixel(d_rgb.at(x, y, 0), d_rgb.at(x, y, 1), d_rgb.at(x, y, 2));
-        const T d_out = d_alpha.data.empty() ? T(0) : d_alpha.at(x, y, 0);
-        const T d_depth = d_image.depth.data.empty() ? T(0) : d_image.depth.at(x, y, 0);
-        d_background += d_pixel * transmittance;
-        pixel_backward<T>(list, blended, d_pixel, d_out, d_depth, background, kernel,
-                          intersections);
+        const Image<T>&d_rgb = d_image.colour, &d_alpha = d_image.alpha, &d_depth = d_image.depth;
+        PixelGradient<T> d{{d_rgb.at(x, y, 0), d_rgb.at(x, y, 1), d_rgb.at(x, y, 2)}};
+        if (!d_alpha.data.empty()) d.alpha = d_alpha.at(x, y, 0);
+        if (!d_depth.data.empty()) d.depth = d_depth.at(x, y, 0);
+        if (d_depth.channels > 1) d.square = d_depth.at(x, y, 1);
+        d_background += d.colour * transmittance;
+        pixel_backward<T>(list, blended, d, background, kernel, intersections);
     };
     for_each_pixel(lists, tile, d_image.colour.width, d_image.colour.height, pixel);
     return d_background;

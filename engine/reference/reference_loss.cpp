@@ -175,4 +175,21 @@ DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 #undef DARB_INSTANTIATE
 
+DistortionResult distortion(const BlendImages<double>& images, double weight,
+                            const std::vector<bool>& left_out) {
+    const Image<double>& t = images.transmittance;
+    DistortionResult r{0, Image<double>(t.width, t.height, 1), Image<double>(t.width, t.height, 2)};
+    for (std::size_t p = 0; p < t.data.size(); ++p) {
+        const double w = 1 - t.data[p], sum = images.depth.data[p], square = images.square.data[p];
+        if (!(w > 0) || (!left_out.empty() && left_out[p])) continue;
+        const double depth = sum / w;
+        const double share = 2 * weight / (static_cast<double>(t.data.size()) * depth * depth);
+        r.loss += share * (w * square - sum * sum);
+        r.d_alpha.data[p] = share * square;
+        r.d_depth.data[2 * p] = -2 * share * sum;
+        r.d_depth.data[2 * p + 1] = share * w;
+    }
+    return r;
+}
+
 }  // namespace darb::reference

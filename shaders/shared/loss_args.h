@@ -29,6 +29,7 @@ struct DepthLossArgs {
     uint pixels;    // H W
     uint measured;  // 1: the photo has depths behind its colours
     float scale;    // factor of the absolute difference: weight / (H W times the usual depth)
+    float distortion_scale;  // weight of the distortion / (H W)
 };
 
 struct LossSumArgs {
