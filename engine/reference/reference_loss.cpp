@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/core/error.h"
+#include "shaders/shared/loss_args.h"
 
 namespace darb::reference {
 namespace {
@@ -183,8 +184,12 @@ DistortionResult distortion(const BlendImages<double>& images, double weight,
         const double w = 1 - t.data[p], sum = images.depth.data[p], square = images.square.data[p];
         if (!(w > 0) || (!left_out.empty() && left_out[p])) continue;
         const double depth = sum / w;
-        const double share = 2 * weight / (static_cast<double>(t.data.size()) * depth * depth);
-        r.loss += share * (w * square - sum * sum);
+        const double pairs = 2 * (w * square - sum * sum) / (depth * depth);
+        const double width = DISTORTION_WIDTH * DISTORTION_WIDTH;
+        const double of_pixel = weight / static_cast<double>(t.data.size());
+        const double by_pairs = of_pixel * width / ((pairs + width) * (pairs + width));
+        const double share = 2 * by_pairs / (depth * depth);
+        r.loss += of_pixel * pairs / (pairs + width);
         r.d_alpha.data[p] = share * square;
         r.d_depth.data[2 * p] = -2 * share * sum;
         r.d_depth.data[2 * p + 1] = share * w;

@@ -38,10 +38,10 @@ struct DistortionResult {
     Image<double> d_depth;  // [H][W][2] dL/d(depth), dL/d(square)
 };
 
-/// The distortion of depths: weight times the mean over pixels of the sum over pairs of splats of
-/// w_i w_j ((z_i - z_j) / D)^2, with w the weights in the pixel, z the depths, and D = sum w z /
-/// sum w held constant. images: a picture's, with its squares. left_out: [H W] pixels that do not
-/// count, or empty.
+/// The distortion of depths: weight times the mean over pixels of p / (p + k^2), k being
+/// DISTORTION_WIDTH and p the sum over pairs of splats of w_i w_j ((z_i - z_j) / D)^2, with w the
+/// weights in the pixel, z the depths, and D = sum w z / sum w held constant. images: a picture's,
+/// with its squares. left_out: [H W] pixels that do not count, or empty.
 DistortionResult distortion(const BlendImages<double>& images, double weight,
                             const std::vector<bool>& left_out = {});
 

@@ -4,8 +4,9 @@
 // Measured depths (MEASURED): the absolute difference between D and the depth that was measured there, in world units.
 // It counts where there is one and the splats cover at least half of the pixel; with less there is no surface to
 // compare.
-// Distortion (DEPTH_SPREAD): the sum over pairs of w_i w_j ((z_i - z_j) / D)^2, in which D is a constant. It is 2 (W
-// sum(w z z) - sum(w z)^2) / D^2 whatever z is counted from; lib/depth_sum.glsl says from what.
+// Distortion (DEPTH_SPREAD): p / (p + k^2), with p the sum over pairs of w_i w_j ((z_i - z_j) / D)^2, in which D is a
+// constant, and k the DISTORTION_WIDTH. p is 2 (W sum(w z z) - sum(w z)^2) / D^2 whatever z is counted from;
+// lib/depth_sum.glsl says from what.
 // Place: after the loss of the colours, before blend_backward.
 // Work: one thread per pixel. Shared memory: none. Reads the picture, transmittance and photo; writes the planes of
 // d_image behind the colours. With ADD it adds to that of 1 - transmittance.
@@ -49,8 +50,11 @@ void main() {
     if (DEPTH_SPREAD == 1 && cover > 0.0 && known) {
         const float sum = image[DEPTH_PLANE * args.pixels + p];
         const float depth = first + sum / cover;
-        const float share = 2.0 * args.distortion_scale / (depth * depth);
-        d_cover += share * image[SQUARE_PLANE * args.pixels + p];
+        const float square = image[SQUARE_PLANE * args.pixels + p];
+        const float pairs = 2.0 * max(cover * square - sum * sum, 0.0) / (depth * depth);
+        const float width = float(DISTORTION_WIDTH * DISTORTION_WIDTH), near = width / (pairs + width);
+        const float share = 2.0 * args.distortion_scale * near * near / (width * depth * depth);
+        d_cover += share * square;
         d_sum -= 2.0 * share * sum;
         d_square = share * cover;
     }

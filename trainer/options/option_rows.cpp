@@ -147,8 +147,8 @@ const OptionRow kRows[] = {
      .setting = "/effects/distortion_weight",
      .member = &Opt::distortion_weight,
      .group = option_group::kEffects,
-     .help = "weight of how far the splats of a pixel lie apart along its ray, squared, as a share "
-             "of its depth; 0: none",
+     .help = "weight of how far the splats of a pixel lie apart along its ray, where they lie "
+             "within a few hundredths of its depth; 0: none",
      .stands = lays_on_surfaces},
     {.flags = "--flatness-weight",
      .setting = "/effects/flatness_weight",

@@ -62,8 +62,9 @@ class DepthLoss {
 
     /// The gradient of weights.measured times the mean over all pixels of |depth - measured| /
     /// usual, a pixel without a measured depth having none, and of weights.distortion times the
-    /// mean of the sum over pairs of splats of w_i w_j ((z_i - z_j) / depth)^2, in which the
-    /// pixel's depth is a constant. Belongs to the pass "depth loss".
+    /// mean of p / (p + DISTORTION_WIDTH^2), p being the sum over pairs of splats of w_i w_j ((z_i
+    /// - z_j) / depth)^2, in which the pixel's depth is a constant. Belongs to the pass "depth
+    /// loss".
     void record(Commands& commands, const DepthLossBuffers& buffers, std::uint32_t pixels,
                 const DepthLossWeights& weights);
 
