@@ -65,8 +65,8 @@ struct TrainOptions {
     // regulariser of the smallest scales.
     bool surface = false;
     float surface_from = 0.5f;        // share of the run before these terms count
-    float distortion_weight = 0.01f;  // of splats of a pixel that lie apart along its ray
-    float flatness_weight = 0.1f;     // of the mean of smallest scales, scene extents
+    float distortion_weight = 0.03f;  // of splats of a pixel that lie apart along its ray
+    float flatness_weight = 0;        // of the mean of smallest scales, scene extents
     // Poses and intrinsics of the photos are trained beside the splats: see camera_refinement.h.
     bool refine_cameras = false;
     // px a visit, falling to a fiftieth over the run; absent: 0.1 where tracks anchor them, else
