@@ -441,9 +441,9 @@ void override_rows(const EffectChoice& choice, EffectPlan& plan, int most_degree
 std::vector<int> impossible_effects(EffectUse use) {
     switch (use) {
         case EffectUse::pictures:
-            return {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_CAMERAS};
+            return {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_CAMERAS, EFFECT_SURFACE};
         case EffectUse::measuring:
-            return {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH, EFFECT_CAMERAS};
+            return {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH, EFFECT_CAMERAS, EFFECT_SURFACE};
         default:
             return {};
     }
@@ -458,6 +458,7 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
         fmt::format("the file says SplatRenderMode {}", model.antialias ? "mip" : "default")};
     plan.row(EFFECT_EXPOSURE).reason = "of photos in training alone";
     plan.row(EFFECT_CAMERAS).reason = "of photos in training alone";
+    plan.row(EFFECT_SURFACE).reason = "of training alone";
     plan.row(EFFECT_OFF_CENTRE) = centre_rule(views);
     plan.row(EFFECT_LENS) = lens_rule(views);
     plan.row(EFFECT_ALPHA).reason = "of photos alone; pictures are over the background";
@@ -472,7 +473,8 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
         plan.row(EFFECT_NEAR) = near_rule(model, views, outputs.near_plane);
     }
     override_rows(choice, plan, model.sh_degree,
-                  {EFFECT_ANTIALIAS, EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH, EFFECT_CAMERAS});
+                  {EFFECT_ANTIALIAS, EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH, EFFECT_CAMERAS,
+                   EFFECT_SURFACE});
     return plan;
 }
 
@@ -490,10 +492,12 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
     plan.row(EFFECT_ALPHA) = alpha_rule(dataset, photos);
     plan.row(EFFECT_DEPTH) = depth_rule(dataset.views);
     plan.row(EFFECT_CAMERAS).reason = "off unless it is asked for: --refine-cameras on";
+    plan.row(EFFECT_SURFACE).reason =
+        "off unless it is asked for, with --effects +surface, as depths may cost PSNR";
     plan.row(EFFECT_HUGE) = huge_rule();
     plan.row(EFFECT_NEAR) = {true, false, 0, 0,
                              "splats move while they train, beside the cameras too"};
-    override_rows(choice, plan, sh_degree, {EFFECT_DEPTH, EFFECT_CAMERAS});
+    override_rows(choice, plan, sh_degree, {EFFECT_DEPTH, EFFECT_CAMERAS, EFFECT_SURFACE});
     if (plan.on(EFFECT_DEPTH) && plan.row(EFFECT_DEPTH).measured == 0)
         throw Error("--effects with depth", "no training photo has a measured depth",
                     "Put depths/NAME.png or .npy beside the photos, or leave +depth out.");

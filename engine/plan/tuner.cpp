@@ -521,7 +521,8 @@ TuningRecord look_again(Device& device, TuningRecord record, TimedFrame frame) {
         device.set_tuning(before);
         device.forget_peak();
     });
-    frame.options.camera_gradient = frame.options.alpha_gradient = frame.options.depth_sum = false;
+    frame.options.camera_gradient = frame.options.alpha_gradient = frame.options.depth_sum =
+        frame.options.depth_spread = false;
     record.seen_in_a_run = true;
     const std::unique_ptr<TuningFrame> chosen = frame_by(device, record.choice, &frame);
     if (!chosen) return record;

@@ -41,6 +41,7 @@ void check_step(const AdamStep& step) {
     check("the correction of the second moment", step.inverse_sqrt_correction2);
     check("the weight of opacities", step.opacity_weight);
     check("the weight of scales", step.scale_weight);
+    check("the weight of flatness", step.flatness_weight);
     check("the clearance", step.clearance);
     check("1 - beta1", step.beta1 > 0 ? 1 - step.beta1 : step.beta1);
     check("1 - beta2", step.beta2 > 0 ? 1 - step.beta2 : step.beta2);
@@ -75,15 +76,16 @@ AdamUpdate::AdamUpdate(Device& device)
       fade_(device, "fade_near", {{"THREADS", SPLAT_GROUP}}),
       add_views_(device, "add_views", {{"THREADS", SPLAT_GROUP}}) {}
 
-const Pipeline& AdamUpdate::pipeline(int attribute, std::uint32_t floats, int rest) {
-    const std::array<int, 3> key{attribute, static_cast<int>(floats), rest};
+const Pipeline& AdamUpdate::pipeline(int attribute, std::uint32_t floats, int rest, bool flatness) {
+    const std::array<int, 4> key{attribute, static_cast<int>(floats), rest, flatness ? 1 : 0};
     const auto found = pipelines_.find(key);
     if (found != pipelines_.end()) return found->second;
     const SpecConstants constants{
         {"THREADS", SPLAT_GROUP},
         {"FLOATS", static_cast<std::int32_t>(floats)},
         {"STEP", kSplatAttributes[static_cast<std::size_t>(attribute)].step},
-        {"REST", rest}};
+        {"REST", rest},
+        {"FLATNESS", flatness ? 1 : 0}};
     return pipelines_.emplace(key, Pipeline(*device_, "adam_update", constants)).first->second;
 }
 
@@ -115,6 +117,10 @@ void AdamUpdate::record(Commands& commands, GpuSplats& splats, const GradientBuf
         args.share2 = static_cast<float>(1.0 - beta2);
         args.gradient_scale = scale;
         args.weight = weight_of(step, rule, splats.count());
+        const bool flatness = rule == STEP_SCALE && step.flatness_weight > 0;
+        if (flatness)
+            args.flatness_weight =
+                step.flatness_weight / static_cast<float>(splats.count() + step.splats_gone);
         args.regularise_unseen = step.regularise_unseen;
         args.largest = step.largest_log_scale;
         args.rest_share = 1.0f / static_cast<float>(step.rest_every);
@@ -125,9 +131,11 @@ void AdamUpdate::record(Commands& commands, GpuSplats& splats, const GradientBuf
             const AttributeRows rows = splats.rows(a);
             const BufferRange gradient = range_of_rows(gradients.of(a), rows, range);
             const std::uint64_t held = rows.rows_held(range.count);
-            const Groups g = groups_for(held * (rows.columns > 0 ? rows.columns : floats));
+            const Groups g = groups_for(held * (rows.columns > 0 ? rows.columns
+                                                : flatness       ? 1
+                                                                 : floats));
             commands.dispatch(
-                pipeline(a, floats, rest), args,
+                pipeline(a, floats, rest, flatness), args,
                 {range_of_rows(splats.parameters(a), rows, range),
                  range_of_rows(splats.moments(a), splats.rows(a, 2), range), gradient,
                  gradients.views(), rest == REST_EACH ? gradient : splats.rest_sum(range), status},

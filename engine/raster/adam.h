@@ -26,6 +26,7 @@ struct AdamStep {
     // Weights in the loss of the mean opacity and the mean scale, over the splats that the frame
     // shows or over all.
     float opacity_weight = 0, scale_weight = 0;
+    float flatness_weight = 0;  // and that of the mean of each splat's smallest scale
     // Share of the step's views in which they also act on splats that the view does not show.
     float regularise_unseen = 0;
     float largest_log_scale = std::numeric_limits<float>::max();  // no scale grows beyond it
@@ -76,10 +77,10 @@ class AdamUpdate {
                      const Buffer& gradient_sum);
 
   private:
-    const Pipeline& pipeline(int attribute, std::uint32_t floats, int rest);
+    const Pipeline& pipeline(int attribute, std::uint32_t floats, int rest, bool flatness);
 
     Device* device_;
-    std::map<std::array<int, 3>, Pipeline> pipelines_;  // by attribute, floats and REST_*
+    std::map<std::array<int, 4>, Pipeline> pipelines_;  // by what pipeline() takes
     Pipeline fade_, add_views_;
 };
 

@@ -35,8 +35,9 @@ FrameBytes Backward::device_bytes(const FrameSize& size) {
     return bytes;
 }
 
-Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, int rest) {
-    const std::array<int, 4> key{sh_degree, sh_stored, update, rest};
+Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, int rest,
+                                     bool flatness) {
+    const std::array<int, 5> key{sh_degree, sh_stored, update, rest, flatness ? 1 : 0};
     const auto found = project_.find(key);
     if (found != project_.end()) return found->second;
     SpecConstants constants = projection_constants(*device_, options_, sh_degree, sh_stored);
@@ -45,6 +46,7 @@ Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, i
     constants["SUMS_BY_CHUNKS"] = sums_by_chunks_ ? 1 : 0;
     constants["UPDATE"] = update;
     constants["REST"] = rest;
+    constants["FLATNESS"] = flatness ? 1 : 0;
     return project_.emplace(key, Pipeline(*device_, "project_backward", constants)).first->second;
 }
 
@@ -130,12 +132,14 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
     args.inverse_sqrt_correction2 = step.inverse_sqrt_correction2;
     args.opacity_weight = step.opacity_weight / n;
     args.scale_weight = step.scale_weight / (3.0f * n);
+    args.flatness_weight = step.flatness_weight / n;
     args.regularise_unseen = step.regularise_unseen > 0 ? 1u : 0u;
     args.largest_log_scale = step.largest_log_scale;
     args.clearance = step.clearance;
     args.rest_share = 1.0f / static_cast<float>(step.rest_every);
     const int rest = view.sh_degree > 0 ? step.rest : REST_EACH;  // nothing to step at degree 0
-    Pipeline& pipeline = project_pipeline(view.sh_degree, splats.sh_degree(), UPDATE_ADAM, rest);
+    Pipeline& pipeline = project_pipeline(view.sh_degree, splats.sh_degree(), UPDATE_ADAM, rest,
+                                          step.flatness_weight > 0);
     for (const SplatRange& range : splats.trained_ranges()) {
         args.first_splat = range.first;
         args.splat_end = range.first + range.count;
@@ -167,7 +171,7 @@ void Backward::record_gradients(Commands& commands, const FrameView& view, const
     args.camera_index = view.index;
     args.low_pass = static_cast<float>(LOW_PASS_DEFAULT);
     Pipeline& pipeline = project_pipeline(view.sh_degree, splats.sh_degree(),
-                                          add ? UPDATE_ADD : UPDATE_STORE, REST_EACH);
+                                          add ? UPDATE_ADD : UPDATE_STORE, REST_EACH, false);
     for (const SplatRange& range : splats.ranges()) {
         args.first_splat = range.first;
         args.splat_end = range.first + range.count;

@@ -54,7 +54,7 @@ class Backward {
 
   private:
     static BufferList<Backward> splat_buffers(std::uint64_t splats);
-    Pipeline& project_pipeline(int sh_degree, int sh_stored, int update, int rest);
+    Pipeline& project_pipeline(int sh_degree, int sh_stored, int update, int rest, bool flatness);
     /// What project_backward binds beside the frame and the splats.
     struct ProjectBuffers {
         std::vector<BufferRange> state;  // moments or gradients
@@ -73,7 +73,7 @@ class Backward {
     bool sums_by_chunks_;  // by the device's tuning
     Pipeline chunks_;      // made when needed
     // Keyed by the degree in use, that of the buffers, UPDATE_* and REST_*.
-    std::map<std::array<int, 4>, Pipeline> project_;
+    std::map<std::array<int, 5>, Pipeline> project_;
     std::uint32_t splat_capacity_ = 0;
     Buffer gradient_sum_;
 };

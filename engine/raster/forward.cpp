@@ -48,6 +48,7 @@ SpecConstants kernel_constants(const Device& device, const ForwardOptions& optio
     constants["LINEAR_VALUES"] = options.linear_values ? 1 : 0;
     constants["DIRECT_COLOUR"] = options.direct_colour ? 1 : 0;
     constants["DEPTH_SUM"] = options.depth_sum ? 1 : 0;
+    constants["DEPTH_SPREAD"] = options.depth_spread ? 1 : 0;
     return for_several_passes(std::move(constants));
 }
 

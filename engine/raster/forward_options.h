@@ -85,12 +85,20 @@ struct ForwardOptions {
     // along the optical axis; dL/d(image) has a fifth for it, and the fourth as alpha_gradient has.
     // Not with DEPTH_ORDER_PIXEL.
     bool depth_sum = false;
+    // With depth_sum two planes more: sum w (z - z0)^2, and z0, the depth of the first splat that a
+    // pixel shows; the fourth is then sum w (z - z0). dL/d(image) has one more for the squares, and
+    // then z0 once more. So the spread of depths is exact in float where a surface is far away.
+    bool depth_spread = false;
     bool camera_gradient = false;  // Backward::record_gradients leaves dL/d(camera), too
 };
 
 /// Planes [H][W] of dL/d(image) that the backward pass takes.
 constexpr std::uint64_t d_image_planes(const ForwardOptions& options) {
-    return options.depth_sum ? 5 : options.alpha_gradient ? 4 : 3;
+    return options.depth_spread ? 7 : options.depth_sum ? 5 : options.alpha_gradient ? 4 : 3;
+}
+/// Planes [H][W] of the image.
+constexpr std::uint32_t image_planes(const ForwardOptions& options) {
+    return options.depth_spread ? 6 : options.depth_sum ? 4 : 3;
 }
 
 /// Whether an exponential is the slow part of w: the Gaussian and generalized_exponential.

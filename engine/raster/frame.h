@@ -24,10 +24,11 @@ struct FrameSize {
     bool deep = false;                // some frame had depths beyond SHORT_DEPTH_BITS
     std::uint32_t bucket = 0;         // intersections per checkpoint; 0: there are none
     bool shaped = false;              // the kernel has shapes
-    bool depth_sum = false;           // as in ForwardOptions
+    bool depth_sum = false, depth_spread = false;  // as in ForwardOptions
     /// Size of a checkpoint.
     std::uint64_t record_bytes() const {
-        return CHECKPOINT_BYTES + (depth_sum ? TILE_SIZE * TILE_SIZE * sizeof(float) : 0);
+        const std::uint64_t more = depth_spread ? 2 : depth_sum ? 1 : 0;
+        return CHECKPOINT_BYTES + more * TILE_SIZE * TILE_SIZE * sizeof(float);
     }
     /// For every tile one more than its full buckets.
     std::uint64_t checkpoint_records() const {
@@ -76,8 +77,8 @@ struct TileIntersections {
     Buffer no_huge_rank;              // a word, in its place until then
 };
 
-/// float [3][H][W] not clamped, a plane more where depths are summed; what the backward pass walks
-/// back from.
+/// float [3][H][W] not clamped, and the planes of depths that ForwardOptions asks for; what the
+/// backward pass walks back from.
 struct FrameImages {
     Buffer image;
     Buffer final_transmittance, last_intersection;  // [H][W], where they are stored

@@ -32,8 +32,9 @@ std::uint32_t most_intersections(const Device& device, const ForwardOptions& opt
     const std::uint32_t most = FrameBuffers::max_intersections(device);
     if (!options.depth_sum) return most;
     // Two floats beside the partials, and larger checkpoints.
-    return std::min(most / 5 * 4, static_cast<std::uint32_t>(std::min<std::uint64_t>(
-                                      device.info().max_storage_buffer_bytes / 8, 1u << 30)));
+    return std::min(most / (options.depth_spread ? 6 : 5) * 4,
+                    static_cast<std::uint32_t>(std::min<std::uint64_t>(
+                        device.info().max_storage_buffer_bytes / 8, 1u << 30)));
 }
 
 int depth_digit_bits(const Device& device) {
@@ -99,7 +100,7 @@ BufferList<FrameImages> checkpoint_buffers(const FrameSize& size) {
 BufferList<FrameImages> pixel_buffers(const ForwardOptions& options, std::uint64_t pixels,
                                       std::uint32_t list_segments) {
     const bool store = options.store_for_backward;
-    return {{&FrameImages::image, "image", pixels * (options.depth_sum ? 16 : 12)},
+    return {{&FrameImages::image, "image", pixels * 4 * image_planes(options)},
             {&FrameImages::final_transmittance, "final transmittance",
              store || list_segments > 1 ? pixels * 4 : 4},
             {&FrameImages::last_intersection, "last intersection", store ? pixels * 4 : 4}};
@@ -125,6 +126,7 @@ FrameBuffers::FrameBuffers(Device& device, const ForwardOptions& options)
     frame_.size.bucket = bucket(device, options);
     frame_.size.shaped = kernel_has_shape(options.kernel);
     frame_.size.depth_sum = options.depth_sum;
+    frame_.size.depth_spread = options.depth_spread;
     make_buffers(device, frame_.counters, counter_buffers(), "project");
     make_buffers(device, frame_.intersections, no_huge_buffers(), "project");
     make_buffers(device, frame_.images, checkpoint_buffers({}), "blend");
@@ -212,7 +214,7 @@ void FrameBuffers::reserve_image(int width, int height) {
         size.tiles = tiles;
     }
     if (const std::uint64_t pixels = std::uint64_t(width) * height; pixels > size.pixels) {
-        check_frame(*device_, width, height, {}, options_.depth_sum ? 4 : 3);
+        check_frame(*device_, width, height, {}, image_planes(options_));
         size.pixels = 0;
         make_buffers(*device_, frame_.images, pixel_buffers(options_, pixels, size.list_segments),
                      "blend");

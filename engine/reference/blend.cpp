@@ -287,11 +287,11 @@ Vec3<T> background_of(const RenderSettings& settings) {
     return {T(settings.background[0]), T(settings.background[1]), T(settings.background[2])};
 }
 
-/// dL/d(image) at a pixel.
+/// dL/d(colour, 1 - T, sum of T alpha depth, sum of T alpha depth^2) of a pixel.
 template <class T>
 struct PixelGradient {
     Vec3<T> colour;
-    T alpha, depth;
+    T alpha = 0, depth = 0, square = 0;
 };
 
 /// Goes back to front over the splats that a pixel blended and calls visit(blended, dL/dalpha).
@@ -302,15 +302,18 @@ void pixel_backward(std::span<const ProjectedSplat<T>> list, std::span<const Ble
                     const PixelGradient<T>& d_pixel, const Vec3<T>& background,
                     const Visit& visit) {
     Vec3<T> behind = background;
-    T open = 1, depth_behind = 0;
+    T open = 1, depth_behind = 0, square_behind = 0;
     for (size_t i = blended.size(); i-- > 0;) {
         const Blended<T>& b = blended[i];
         const ProjectedSplat<T>& s = list[b.entry];
         const T alpha = b.sample.alpha;
+        const T square = s.depth * s.depth;
         visit(b, b.before * (glm::dot(d_pixel.colour, s.colour - behind) + d_pixel.alpha * open +
-                             d_pixel.depth * (s.depth - depth_behind)));
+                             d_pixel.depth * (s.depth - depth_behind) +
+                             d_pixel.square * (square - square_behind)));
         behind = alpha * s.colour + (1 - alpha) * behind;
         depth_behind = alpha * s.depth + (1 - alpha) * depth_behind;
+        square_behind = alpha * square + (1 - alpha) * square_behind;
         open *= 1 - alpha;
     }
 }
@@ -331,11 +334,11 @@ Vec3<T> tile_backward(const TileLists& lists, size_t tile,
                                               [&](size_t k, const Sample<T>& sample, T before) {
                                                   blended.push_back({k, sample, before});
                                               });
-        const Image<T>&d_rgb = d_image.colour, &d_alpha = d_image.alpha;
-        const PixelGradient<T> d_pixel{
-            {d_rgb.at(x, y, 0), d_rgb.at(x, y, 1), d_rgb.at(x, y, 2)},
-            d_alpha.data.empty() ? T(0) : d_alpha.at(x, y, 0),
-            d_image.depth.data.empty() ? T(0) : d_image.depth.at(x, y, 0)};
+        const Image<T>&d_rgb = d_image.colour, &d_alpha = d_image.alpha, &d_depth = d_image.depth;
+        PixelGradient<T> d_pixel{{d_rgb.at(x, y, 0), d_rgb.at(x, y, 1), d_rgb.at(x, y, 2)}};
+        if (!d_alpha.data.empty()) d_pixel.alpha = d_alpha.at(x, y, 0);
+        if (!d_depth.data.empty()) d_pixel.depth = d_depth.at(x, y, 0);
+        if (d_depth.channels > 1) d_pixel.square = d_depth.at(x, y, 1);
         d_background += d_pixel.colour * transmittance;
         pixel_backward<T>(list, blended, d_pixel, background,
                           [&](const Blended<T>& b, T d_blended) { visit(b, d_blended, d_pixel); });
@@ -353,12 +356,14 @@ void blend_tile(const TileLists& lists, size_t tile, const std::vector<Projected
     const Vec3<T> background = background_of<T>(settings);
     const auto blend_pixel = [&](int x, int y) {
         Vec3<T> colour(0);
-        T depth = 0;
+        T depth = 0, square = 0;
         std::int32_t count = 0;
         const T transmittance = walk_pixel<T>(list, x, y, kernel, settings,
                                               [&](size_t k, const Sample<T>& sample, T before) {
                                                   colour += before * sample.alpha * list[k].colour;
-                                                  depth += before * sample.alpha * list[k].depth;
+                                                  const T z = list[k].depth;
+                                                  depth += before * sample.alpha * z;
+                                                  square += before * sample.alpha * z * z;
                                                   ++count;
                                               });
         colour += transmittance * background;
@@ -367,6 +372,7 @@ void blend_tile(const TileLists& lists, size_t tile, const std::vector<Projected
         }
         images.transmittance.at(x, y, 0) = transmittance;
         images.depth.at(x, y, 0) = depth;
+        if (!images.square.data.empty()) images.square.at(x, y, 0) = square;
         images.contributions.at(x, y, 0) = count;
     };
     for_each_pixel(lists, tile, images.colour.width, images.colour.height, blend_pixel);
@@ -381,7 +387,8 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
     return tile_backward<T>(lists, tile, list, kernel, settings, d_image,
                             [&](const Blended<T>& b, T d_alpha, const PixelGradient<T>& d_pixel) {
                                 ProjectedGradient<T>& to = intersections[b.entry];
-                                to.d_depth += d_pixel.depth * (b.before * b.sample.alpha);
+                                to.d_depth += (d_pixel.depth + 2 * d_pixel.square * list[b.entry].depth) *
+                                              (b.before * b.sample.alpha);
                                 to.d_colour += d_pixel.colour * (b.before * b.sample.alpha);
                                 add_sample_gradient(list[b.entry], b.sample, d_alpha, kernel, to);
                             });

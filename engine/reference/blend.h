@@ -47,13 +47,15 @@ struct BlendImages {
     Image<T> transmittance;             // [H][W][1], T after the last splat
     Image<T> depth;                     // [H][W][1], sum of T alpha depth
     Image<std::int32_t> contributions;  // [H][W][1], splats that were blended
+    Image<T> square;                    // [H][W][1], sum of T alpha depth^2; empty: not wanted
 };
 
 template <class T>
 void blend_tile(const TileLists& lists, size_t tile, const std::vector<ProjectedSplat<T>>& splats,
                 const KernelTable& kernel, const RenderSettings& settings, BlendImages<T>& images);
 
-/// dL/d(image) [H][W][3], and dL/d(1 - T) and dL/d(depth), each [H][W][1] or empty.
+/// dL/d(image) [H][W][3], and dL/d(1 - T) and dL/d(depth), each [H][W][1] or empty; depth may have
+/// a second channel, dL/d(square).
 template <class T>
 struct ImageGradient {
     const Image<T>& colour;

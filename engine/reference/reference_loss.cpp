@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/core/error.h"
+#include "shaders/shared/loss_args.h"
 
 namespace darb::reference {
 namespace {
@@ -174,5 +175,26 @@ Image<T> to_unit_range(const ImageU8& photo) {
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 #undef DARB_INSTANTIATE
+
+DistortionResult distortion(const BlendImages<double>& images, double weight,
+                            const std::vector<bool>& left_out) {
+    const Image<double>& t = images.transmittance;
+    DistortionResult r{0, Image<double>(t.width, t.height, 1), Image<double>(t.width, t.height, 2)};
+    for (std::size_t p = 0; p < t.data.size(); ++p) {
+        const double w = 1 - t.data[p], sum = images.depth.data[p], square = images.square.data[p];
+        if (!(w > 0) || (!left_out.empty() && left_out[p])) continue;
+        const double depth = sum / w;
+        const double pairs = 2 * (w * square - sum * sum) / (depth * depth);
+        const double width = DISTORTION_WIDTH * DISTORTION_WIDTH;
+        const double of_pixel = weight / static_cast<double>(t.data.size());
+        const double by_pairs = of_pixel * width / ((pairs + width) * (pairs + width));
+        const double share = 2 * by_pairs / (depth * depth);
+        r.loss += of_pixel * pairs / (pairs + width);
+        r.d_alpha.data[p] = share * square;
+        r.d_depth.data[2 * p] = -2 * share * sum;
+        r.d_depth.data[2 * p + 1] = share * w;
+    }
+    return r;
+}
 
 }  // namespace darb::reference

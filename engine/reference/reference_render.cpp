@@ -73,7 +73,8 @@ BasicRenderResult<T> render(const Splats<T>& splats, const Camera& camera,
     result.images = {Image<T>(camera.width, camera.height, 3),
                      Image<T>(camera.width, camera.height, 1),
                      Image<T>(camera.width, camera.height, 1),
-                     Image<std::int32_t>(camera.width, camera.height, 1)};
+                     Image<std::int32_t>(camera.width, camera.height, 1),
+                     Image<T>(camera.width, camera.height, 1)};
     parallel_for(result.tiles.tile_count(), settings.threads, [&](size_t tile) {
         blend_tile(result.tiles, tile, result.projected, kernel, settings, result.images);
     });

@@ -40,7 +40,7 @@ BasicRenderResult<T> render(const Splats<T>& splats, const Camera& camera,
 
 /// `result` must be render's for the same splats, camera and settings. d_image [H][W][3] is
 /// dL/d(image); d_alpha and d_depth, [H][W][1] or empty for none, are dL/d(1 - transmittance) and
-/// dL/d(depth).
+/// dL/d(depth); a second channel of d_depth is dL/d(square).
 template <class T>
 BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
                            const RenderSettings& settings, const BasicRenderResult<T>& result,

@@ -10,7 +10,7 @@ Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, floa
                 uint number) {
     Sums s = NO_SUMS;
     for (uint k = 0u; k < PIXELS; ++k) {
-        float d_z = 0.0;
+        vec3 d_z = vec3(0.0);
         if (DEPTH_SUM == 1) d_z = d_depth[k];
         add_pixel(s, px.transmittance[k], px.behind[k], d - vec2(slot_offset(k)), shape, l22, light, exponent,
                   z, px.d_colour[k], d_z, number <= px.last[k]);

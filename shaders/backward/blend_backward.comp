@@ -52,6 +52,7 @@ const uint CHUNK = 128u;
 #define PARTIALS_PUT +=
 #include "lib/partials.glsl"
 #include "lib/reduce.glsl"
+#include "backward/depth_gradient.glsl"
 #include "backward/splat_sums.glsl"
 
 uint place_of(uint j) {

@@ -44,6 +44,7 @@ layout(set = 0, binding = 14, scalar) writeonly buffer PartialExponent { float p
 #include "lib/projected.glsl"
 #include "lib/bucket.glsl"
 #include "lib/lockstep.glsl"
+#include "backward/depth_gradient.glsl"
 #include "backward/splat_sums.glsl"
 
 const uint SLOT_BITS = 8u;  // enough for TILE_PIXELS
@@ -51,6 +52,7 @@ shared uint pixel_word[TILE_PIXELS];  // slot, and above it how many of the buck
 shared float pixel_transmittance[TILE_PIXELS], pixel_behind[TILE_PIXELS];
 shared float pixel_d_red[TILE_PIXELS], pixel_d_green[TILE_PIXELS], pixel_d_blue[TILE_PIXELS];
 shared float pixel_d_depth[DEPTH_SUM == 1 ? TILE_PIXELS : 1u];
+shared float pixel_d_square[DEPTH_SPREAD == 1 ? TILE_PIXELS : 1u], pixel_first_depth[DEPTH_SPREAD == 1 ? TILE_PIXELS : 1u];
 
 // The blocks that intersections [begin, end) touch, in the bits of an intersection.
 uint touched_blocks(uint begin, uint end) {
@@ -84,7 +86,14 @@ uint gather_pixels(uvec2 tile, uint record, uint begin, uint end) {
             pixel_d_red[i] = d_image[o];
             pixel_d_green[i] = d_image[plane + o];
             pixel_d_blue[i] = d_image[2u * plane + o];
-            if (DEPTH_SUM == 1) pixel_d_depth[i] = d_image[DEPTH_GRADIENT_PLANE * plane + o];
+            if (DEPTH_SUM == 1) {
+                const vec3 d = load_depth_gradient(plane, o);
+                pixel_d_depth[i] = d.x;
+                if (DEPTH_SPREAD == 1) {
+                    pixel_d_square[i] = d.y;
+                    pixel_first_depth[i] = d.z;
+                }
+            }
         }
         count += subgroupBallotBitCount(ballot);
     }
@@ -110,8 +119,9 @@ Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, float expone
         }
         const uint word = pixel_word[i];
         const vec2 to_mean = mean - vec2(slot_to_pixel(word & (TILE_PIXELS - 1u)));
-        float d_z = 0.0;
-        if (DEPTH_SUM == 1) d_z = pixel_d_depth[i];
+        vec3 d_z = vec3(0.0);
+        if (DEPTH_SUM == 1) d_z.x = pixel_d_depth[i];
+        if (DEPTH_SPREAD == 1) d_z.yz = vec2(pixel_d_square[i], pixel_first_depth[i]);
         add_pixel(sums, transmittance, behind, to_mean, shape, l22, light, exponent, z,
                   vec3(pixel_d_red[i], pixel_d_green[i], pixel_d_blue[i]),
                   d_z, here && local < word >> SLOT_BITS);

@@ -44,6 +44,8 @@ shared vec4 pair_more[MORE];  // dL/d(alpha) w and dL/d(exponent) of both pixels
 shared vec4 pair_colour[TEAM * PAIRS];                 // dL/dcolour: rgb of the upper pixel, r of the lower one
 shared vec2 pair_colour_rest[TEAM * PAIRS];            // gb of the lower one
 shared vec2 pair_depth[DEPTH_SUM == 1 ? TEAM * PAIRS : 2u];  // dL/d(depth) of both pixels
+const uint SPREAD_PAIRS = DEPTH_SPREAD == 1 ? TEAM * PAIRS : 2u;
+shared vec2 pair_square[SPREAD_PAIRS], pair_first_depth[SPREAD_PAIRS];  // the others of load_depth_gradient
 
 // The sums of an intersection over a block: the partials in two halves, and those beside them.
 const uint OTHERS = RESTS + (SHAPED ? 1u : 0u);
@@ -63,7 +65,14 @@ void put_colours(Pixels px) {
         const vec3 upper = px.d_colour[k], lower = px.d_colour[k + PIXELS / 2u];
         pair_colour[pair] = vec4(upper, lower.r);
         pair_colour_rest[pair] = lower.gb;
-        if (DEPTH_SUM == 1) pair_depth[pair] = vec2(d_depth[k], d_depth[k + PIXELS / 2u]);
+        if (DEPTH_SUM == 1) {
+            const vec3 above = d_depth[k], below = d_depth[k + PIXELS / 2u];
+            pair_depth[pair] = vec2(above.x, below.x);
+            if (DEPTH_SPREAD == 1) {
+                pair_square[pair] = vec2(above.y, below.y);
+                pair_first_depth[pair] = vec2(above.z, below.z);
+            }
+        }
     }
 }
 
@@ -77,7 +86,7 @@ vec4 visit(inout Pixels px, uint k, Record r, vec2 offset) {
     const float alpha = mix(0.0, min(raw, ALPHA_MAX), counts);
     const float before = px.transmittance[k] / (1.0 - alpha);
     float ahead = dot(r.colour, px.d_colour[k]) - px.behind[k];
-    if (DEPTH_SUM == 1) ahead += r.depth * d_depth[k];
+    if (DEPTH_SUM == 1) ahead += depth_by_weight(r.depth, d_depth[k]);
     const float d_alpha = mix(0.0, before * ahead, counts && moves);
     px.behind[k] += alpha * ahead;
     px.transmittance[k] = before;
@@ -120,7 +129,8 @@ struct RowSums {
     float both, both_i, both_ii, lower, lower_i;  // sums of G: of both pixels, and of the lower one
 };
 
-void add_pair(inout RowSums s, inout Moments m, uint share, uint colour, float i) {
+// z: the splat's depth, with DEPTH_SPREAD.
+void add_pair(inout RowSums s, inout Moments m, uint share, uint colour, float i, float z) {
     const vec4 shares = pair_shares[share], c = pair_colour[colour];
     const vec2 rest = pair_colour_rest[colour];
     const float both = shares.x + shares.z;
@@ -131,7 +141,11 @@ void add_pair(inout RowSums s, inout Moments m, uint share, uint colour, float i
     s.lower_i += shares.z * i;
     m.colour += shares.y * c.rgb;
     m.colour += shares.w * vec3(c.a, rest);
-    if (DEPTH_SUM == 1) m.depth += dot(shares.yw, pair_depth[colour]);
+    if (DEPTH_SUM == 1) {
+        vec2 by_depth = pair_depth[colour];
+        if (DEPTH_SPREAD == 1) by_depth += 2.0 * (z - pair_first_depth[colour]) * pair_square[colour];
+        m.depth += dot(shares.yw, by_depth);
+    }
     if (!LOG_FORM) {
         const vec4 more = pair_more[share];
         m.opacity += more.x + more.z;
@@ -147,11 +161,13 @@ Moments sum_pixels() {
     const uint shares = (gl_SubgroupID * SPLATS + splat) * PAIR_STRIDE + first_pair;
     const uint colours = gl_SubgroupID * PAIRS + first_pair;
     const float first_j = float(first_pair / 8u) - 3.5, middle = halves ? float(part & 1u) * 4.0 - 2.0 : 0.0;
+    float z = 0.0;
+    if (DEPTH_SPREAD == 1) z = load_record(records_base() + splat * RECORD).depth;
     Moments m = Moments(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vec3(0.0));
     for (uint row = 0u; row < ROWS_OF_PART; ++row) {
         RowSums s = RowSums(0.0, 0.0, 0.0, 0.0, 0.0);
         [[unroll]] for (uint c = 0u; c < COLUMNS_OF_PART; ++c)
-            add_pair(s, m, shares + row * 8u + c, colours + row * 8u + c, float(c) - (halves ? 1.5 : 3.5));
+            add_pair(s, m, shares + row * 8u + c, colours + row * 8u + c, float(c) - (halves ? 1.5 : 3.5), z);
         if (halves) {
             s.both_ii += middle * (2.0 * s.both_i + middle * s.both);
             s.both_i += middle * s.both;

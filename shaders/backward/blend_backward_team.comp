@@ -22,6 +22,7 @@ const uint CHUNK = 32u;
 #define PARTIALS_PUT =
 #include "lib/partials.glsl"
 #include "lib/reduce.glsl"
+#include "backward/depth_gradient.glsl"
 #include "backward/splat_sums.glsl"
 
 const uint TEAM = AREAS, SUMS = PARTIALS + RESTS + (SHAPED ? 1u : 0u);

@@ -29,6 +29,7 @@ layout(set = 0, binding = 5, scalar) writeonly buffer BucketBehind { float bucke
 #include "lib/pixel_slot.glsl"
 #include "lib/list_part.glsl"
 #include "lib/bucket.glsl"
+#include "backward/depth_gradient.glsl"
 
 const float LEAST_TRANSMITTANCE = 1e-30;  // below it nothing has weight, and no bit of a quotient is right
 
@@ -46,8 +47,8 @@ void main() {
     const vec3 d_colour = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
     float rest = dot(d_colour, vec3(args.background_r, args.background_g, args.background_b));
     if (ALPHA_GRADIENT == 1) rest -= d_image[3u * plane + o];
-    float d_depth = 0.0;
-    if (DEPTH_SUM == 1) d_depth = d_image[DEPTH_GRADIENT_PLANE * plane + o];
+    vec3 d_depth = vec3(0.0);
+    if (DEPTH_SUM == 1) d_depth = load_depth_gradient(plane, o);
     if (SEGMENT > 0u && last > range.y) rest = behind[o];
     const uint first = (range.x - whole.x) / BUCKET;
     uint bucket = (min(last, range.y) - 1u - whole.x) / BUCKET;
@@ -60,7 +61,9 @@ void main() {
         float before = 1.0;
         if (bucket > 0u) before = checkpoints[checkpoint_at(record - 1u, TRANSMITTANCE_PLANE, slot)];
         float ahead = dot(light, d_colour);
-        if (DEPTH_SUM == 1) ahead += checkpoints[checkpoint_at(record, BUCKET_DEPTH_PLANE, slot)] * d_depth;
+        if (DEPTH_SUM == 1) ahead += checkpoints[checkpoint_at(record, BUCKET_DEPTH_PLANE, slot)] * d_depth.x;
+        if (DEPTH_SPREAD == 1)
+            ahead += checkpoints[checkpoint_at(record, BUCKET_SQUARE_PLANE, slot)] * d_depth.y;
         rest = before > LEAST_TRANSMITTANCE ? (ahead + after * rest) / before : 0.0;
         if (bucket == first) break;
         after = before;

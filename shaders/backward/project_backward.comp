@@ -23,6 +23,7 @@ layout(constant_id = 2) const int SH_STORED = 0;
 layout(constant_id = 3) const int UPDATE = UPDATE_ADAM;
 layout(constant_id = 4) const int REST = REST_EACH;
 layout(constant_id = 34) const int SUMS_BY_CHUNKS = 0;  // 1: partial_chunks.comp has added up chunks of intersections
+layout(constant_id = 36) const int FLATNESS = 0;  // 1: the smallest scale of a splat has a regulariser of its own
 
 #define STATE_BINDING (1 + ATTRIBUTES)
 #define FRAME_BINDING (1 + 2 * ATTRIBUTES)
@@ -78,6 +79,7 @@ layout(set = 0, binding = FRAME_BINDING + 12, scalar) readonly buffer PartialExp
 #include "lib/sh.glsl"
 #include "lib/rest.glsl"
 #include "optim/fading.glsl"
+#include "optim/flatness.glsl"
 #include "backward/camera_gradient.glsl"
 #include "backward/project_gradient.glsl"
 
@@ -208,6 +210,10 @@ void regularise(uint i, inout SplatGradient g) {
     for (uint c = 0u; c < 3u; ++c) {
         const float raw = raw_scale[c];
         if (abs(raw) <= LOG_SCALE_LIMIT) g.log_scale[c] += args.scale_weight * exp(raw);
+    }
+    if (FLATNESS == 1) {
+        const uint c = smallest_axis(raw_scale);
+        if (abs(raw_scale[c]) <= LOG_SCALE_LIMIT) g.log_scale[c] += args.flatness_weight * exp(raw_scale[c]);
     }
 }
 

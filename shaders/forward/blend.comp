@@ -85,6 +85,10 @@ void store_checkpoint(Pixels px, uint record) {
             checkpoints[checkpoint_at(record, BUCKET_DEPTH_PLANE, slot)] = bucket_depth[k];
             bucket_depth[k] = 0.0;
         }
+        if (DEPTH_SPREAD == 1) {
+            checkpoints[checkpoint_at(record, BUCKET_SQUARE_PLANE, slot)] = bucket_square[k];
+            bucket_square[k] = 0.0;
+        }
         bucket_colour[k] = vec3(0.0);
     }
 }
@@ -105,8 +109,7 @@ void main() {
         px.last[k] = 0u;
         if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) clear_window(k);
         if (CHECKPOINTS == 1) bucket_colour[k] = vec3(0.0);
-        if (DEPTH_SUM == 1) depth_sum[k] = 0.0;
-        if (DEPTH_SUM == 1 && CHECKPOINTS == 1) bucket_depth[k] = 0.0;
+        clear_depths(k);
     }
     if (SEGMENT > 0u && args.segment > 0u) load(px, first);
     if (range.x < range.y) {

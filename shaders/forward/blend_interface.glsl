@@ -17,7 +17,7 @@ layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
-layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3][H][W], one more plane with DEPTH_SUM
+layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3][H][W] and the planes of lib/depth_sum.glsl
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 9, scalar) writeonly buffer Checkpoints { float checkpoints[]; };  // where CHECKPOINTS

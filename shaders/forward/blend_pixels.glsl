@@ -14,6 +14,15 @@ const uint BUCKET_COLOURS = CHECKPOINTS == 1 ? PIXELS : 1u;
 vec3 bucket_colour[BUCKET_COLOURS];
 const uint DEPTHS = DEPTH_SUM == 1 ? PIXELS : 1u, BUCKET_DEPTHS = CHECKPOINTS == 1 ? DEPTHS : 1u;
 float depth_sum[DEPTHS], bucket_depth[BUCKET_DEPTHS];
+const uint SPREADS = DEPTH_SPREAD == 1 ? PIXELS : 1u, BUCKET_SPREADS = CHECKPOINTS == 1 ? SPREADS : 1u;
+float square_sum[SPREADS], bucket_square[BUCKET_SPREADS], first_depth[SPREADS];
+
+void clear_depths(uint k) {
+    if (DEPTH_SUM == 1) depth_sum[k] = 0.0;
+    if (DEPTH_SUM == 1 && CHECKPOINTS == 1) bucket_depth[k] = 0.0;
+    if (DEPTH_SPREAD == 1) square_sum[k] = first_depth[k] = 0.0;
+    if (DEPTH_SPREAD == 1 && CHECKPOINTS == 1) bucket_square[k] = 0.0;
+}
 
 vec3 load_depth(uint splat) {  // z and its slope
     const vec4 bound = splat_bound[splat];
@@ -27,6 +36,13 @@ void blend_sample(inout Pixels px, uint k, float alpha, vec3 colour, float depth
     const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for a pixel that has ended
     px.colour[k] += (goes_on ? wanted : 0.0) * colour;
     if (CHECKPOINTS == 1) bucket_colour[k] += (goes_on ? wanted : 0.0) * colour;
+    if (DEPTH_SPREAD == 1) {
+        first_depth[k] = before == 1.0 ? depth : first_depth[k];  // no splat before this one counted
+        depth -= first_depth[k];
+        const float square = (goes_on ? wanted : 0.0) * (depth * depth);
+        square_sum[k] += square;
+        if (CHECKPOINTS == 1) bucket_square[k] += square;
+    }
     if (DEPTH_SUM == 1) depth_sum[k] += (goes_on ? wanted : 0.0) * depth;
     if (DEPTH_SUM == 1 && CHECKPOINTS == 1) bucket_depth[k] += (goes_on ? wanted : 0.0) * depth;
     px.transmittance[k] = mix(-abs(before), next, goes_on);

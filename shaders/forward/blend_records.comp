@@ -28,12 +28,16 @@ float alpha_of(Record r, vec2 offset) {
 // Blends a batch of `count` records, before which no pixel had ended. Returns false and leaves px unchanged where one
 // ends in it.
 bool blend_without_ends(inout Pixels px, uint count, vec2 offset) {
-    float transmittance[PIXELS], depths[DEPTHS];
+    float transmittance[PIXELS], depths[DEPTHS], squares[SPREADS], firsts[SPREADS];
     vec3 colour[PIXELS];
     for (uint k = 0u; k < PIXELS; ++k) {
         transmittance[k] = px.transmittance[k];
         colour[k] = px.colour[k];
         if (DEPTH_SUM == 1) depths[k] = depth_sum[k];
+        if (DEPTH_SPREAD == 1) {
+            squares[k] = square_sum[k];
+            firsts[k] = first_depth[k];
+        }
     }
     uint at = records_base(), turn = 0u, number = 0u;
     do {
@@ -41,7 +45,13 @@ bool blend_without_ends(inout Pixels px, uint count, vec2 offset) {
         [[unroll]] for (uint k = 0u; k < PIXELS; ++k) {  // no loop, whose rounds lavapipe counts: LIST_SEGMENT
             const float share = alpha_of(r, offset + vec2(slot_offset(k))) * transmittance[k];
             colour[k] += share * r.colour;
-            if (DEPTH_SUM == 1) depths[k] += share * r.depth;
+            float depth = r.depth;
+            if (DEPTH_SPREAD == 1) {
+                firsts[k] = transmittance[k] == 1.0 ? depth : firsts[k];
+                depth -= firsts[k];
+                squares[k] += share * (depth * depth);
+            }
+            if (DEPTH_SUM == 1) depths[k] += share * depth;
             transmittance[k] -= share;
         }
         number = r.number;
@@ -54,6 +64,10 @@ bool blend_without_ends(inout Pixels px, uint count, vec2 offset) {
         px.transmittance[k] = ended ? px.transmittance[k] : transmittance[k];
         px.colour[k] = ended ? px.colour[k] : colour[k];
         if (DEPTH_SUM == 1) depth_sum[k] = ended ? depth_sum[k] : depths[k];
+        if (DEPTH_SPREAD == 1) {
+            square_sum[k] = ended ? square_sum[k] : squares[k];
+            first_depth[k] = ended ? first_depth[k] : firsts[k];
+        }
         if (STORE_FOR_BACKWARD == 1) px.last[k] = ended ? px.last[k] : number;
     }
     return !ended;
@@ -107,7 +121,7 @@ void main() {
         px.transmittance[k] = at.x < args.width && at.y < args.height ? 1.0 : -1.0;
         px.colour[k] = vec3(0.0);
         px.last[k] = 0u;
-        if (DEPTH_SUM == 1) depth_sum[k] = 0.0;
+        clear_depths(k);
     }
     if (SEGMENT > 0u && args.segment > 0u) load(px, first);
     float least = px.transmittance[0];

@@ -11,6 +11,10 @@ void load(inout Pixels px, uvec2 first) {
         px.transmittance[k] = final_transmittance[o];
         px.colour[k] = vec3(image[o], image[plane + o], image[2u * plane + o]);
         if (DEPTH_SUM == 1) depth_sum[k] = image[DEPTH_PLANE * plane + o];
+        if (DEPTH_SPREAD == 1) {
+            square_sum[k] = image[SQUARE_PLANE * plane + o];
+            first_depth[k] = image[FIRST_DEPTH_PLANE * plane + o];
+        }
         if (STORE_FOR_BACKWARD == 1) px.last[k] = last_intersection[o];
     }
 }
@@ -30,6 +34,10 @@ void store(Pixels px, uvec2 first) {
         image[plane + o] = colour.g;
         image[2u * plane + o] = colour.b;
         if (DEPTH_SUM == 1) image[DEPTH_PLANE * plane + o] = depth_sum[k];
+        if (DEPTH_SPREAD == 1) {
+            image[SQUARE_PLANE * plane + o] = square_sum[k];
+            image[FIRST_DEPTH_PLANE * plane + o] = first_depth[k];
+        }
         if (STORE_FOR_BACKWARD == 1) last_intersection[o] = px.last[k];
         if (STORE_FOR_BACKWARD == 1 || SEGMENT > 0u)
             final_transmittance[o] = more ? px.transmittance[k] : transmittance;

@@ -8,9 +8,10 @@
 
 layout(constant_id = 7) const uint BUCKET = BUCKET_INTERSECTIONS;  // a multiple of SUBGROUP_SIZE; divides SEGMENT
 
-// With DEPTH_SUM there is one more plane, the bucket's share of weight times depth.
-const uint TRANSMITTANCE_PLANE = 3u, BUCKET_DEPTH_PLANE = 4u;
-const uint CHECKPOINT_PLANES = DEPTH_SUM == 1 ? 5u : 4u;
+// With DEPTH_SUM there is one more plane, the bucket's share of weight times depth, and with DEPTH_SPREAD another one
+// for its square.
+const uint TRANSMITTANCE_PLANE = 3u, BUCKET_DEPTH_PLANE = 4u, BUCKET_SQUARE_PLANE = 5u;
+const uint CHECKPOINT_PLANES = DEPTH_SPREAD == 1 ? 6u : DEPTH_SUM == 1 ? 5u : 4u;
 
 // The records of all tiles are separate, and there are at most intersections / BUCKET + tiles. list_begin: where the
 // tile's whole list begins.

@@ -2,9 +2,9 @@
 // The Adam step of one attribute from gradients in buffers, which come from several views or from the caller. It is the
 // same step that project_backward.comp makes from one view, with its regularisers and limits.
 // Place: once for each attribute and range, after the gradients of all views. Source: Kingma and Ba 2015.
-// Work: one thread per float, or per column for the harmonics above the first band (lib/rows.glsl). Shared memory:
-// none. Does nothing when a frame overflowed its intersection buffers. A splat with a gradient that was not finite is
-// left as it is; a float whose own gradient is not finite is counted and left.
+// Work: one thread per float, per column for the harmonics above the first band (lib/rows.glsl), or with FLATNESS per
+// splat. Shared memory: none. Does nothing when a frame overflowed its intersection buffers. A splat with a gradient
+// that was not finite is left as it is; a float whose own gradient is not finite is counted and left.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,6 +19,7 @@ layout(constant_id = 0) const uint THREADS = 64;
 layout(constant_id = 1) const uint FLOATS = 1;  // floats per splat
 layout(constant_id = 2) const int STEP = STEP_PLAIN;
 layout(constant_id = 3) const int REST = REST_EACH;
+layout(constant_id = 36) const int FLATNESS = 0;  // 1, with STEP_SCALE: as in project_backward.comp
 
 layout(push_constant, scalar) uniform Push { AdamUpdateArgs args; };
 // only the range's, as are the next two and rest_sum
@@ -41,6 +42,7 @@ layout(set = 0, binding = 4, scalar) buffer RestSum { vec4 rest_sum[]; };
 #include "lib/linear_id.glsl"
 #include "lib/rows.glsl"
 #include "optim/adam.glsl"
+#include "optim/flatness.glsl"
 
 float regulariser(float x) {
     if (STEP == STEP_SCALE) return abs(x) <= LOG_SCALE_LIMIT ? args.weight * exp(x) : 0.0;
@@ -84,31 +86,52 @@ void step_rest() {
     value_column[at] = value;
 }
 
+// Steps one float. flat_weight: that of its scale in the loss beside its regulariser.
+void step_float(uint at, float shown, float flat_weight) {
+    float g = gradient[at] * args.gradient_scale;
+    if (magnitude_below(g, GRADIENT_LIMIT)) {
+        // Part of the loss of each view that shows the splat, and of a share of the others.
+        if (STEP == STEP_SCALE || STEP == STEP_OPACITY) {
+            const float share = max(shown * args.gradient_scale, args.regularise_unseen);
+            if (share > 0.0) g += share * regulariser(value[at]);
+            if (FLATNESS == 1 && share > 0.0 && abs(value[at]) <= LOG_SCALE_LIMIT)
+                g += share * flat_weight * exp(value[at]);
+        }
+        const float before = value[at];
+        vec2 m = moment[at];
+        float after = adam_step(before, m, g, args.rate);
+        if (STEP == STEP_SCALE) {
+            after = at_most(after, max(before, args.largest));
+        }
+        value[at] = after;
+        moment[at] = m;
+    } else {
+        atomicAdd(status.bad_gradients, 1u);
+    }
+}
+
+// The three scales of a splat, of which one is the smallest.
+void step_scales(uint splat) {
+    if (splat >= args.splat_count || status.overflow != 0u) return;
+    const float shown = views[args.first_splat + splat].y;
+    if (shown < 0.0) return;
+    const uint first = FLOATS * splat;
+    const uint least = smallest_axis(vec3(value[first], value[first + 1u], value[first + 2u]));
+    for (uint c = 0u; c < 3u; ++c) step_float(first + c, shown, c == least ? args.flatness_weight : 0.0);
+}
+
 void main() {
     if (STEP == STEP_REST) {
         step_rest();
+        return;
+    }
+    if (FLATNESS == 1) {
+        step_scales(linear_id());
         return;
     }
     const uint at = linear_id(), splat = at / FLOATS;
     if (splat >= args.splat_count || at % FLOATS >= args.floats_in_use || status.overflow != 0u) return;
     const float shown = views[args.first_splat + splat].y;
     if (shown < 0.0) return;
-    float g = gradient[at] * args.gradient_scale;
-    if (!magnitude_below(g, GRADIENT_LIMIT)) {
-        atomicAdd(status.bad_gradients, 1u);
-        return;
-    }
-    // Part of the loss of each view that shows the splat, and of a share of the others.
-    if (STEP == STEP_SCALE || STEP == STEP_OPACITY) {
-        const float share = max(shown * args.gradient_scale, args.regularise_unseen);
-        if (share > 0.0) g += share * regulariser(value[at]);
-    }
-    const float before = value[at];
-    vec2 m = moment[at];
-    float after = adam_step(before, m, g, args.rate);
-    if (STEP == STEP_SCALE) {
-        after = at_most(after, max(before, args.largest));
-    }
-    value[at] = after;
-    moment[at] = m;
+    step_float(at, shown, 0.0);
 }

@@ -12,14 +12,16 @@
 #define EFFECT_ALPHA 5        // photos with alpha or masks, and a background behind them
 #define EFFECT_DEPTH 6        // a picture of depths
 #define EFFECT_HUGE 7         // splats over very many tiles, and very long lists of tiles
-#define EFFECT_NEAR 8     // splats beside the picture that reach into it; the Jacobian is clamped
-#define EFFECT_CAMERAS 9  // poses and intrinsics are trained beside the splats
-#define EFFECT_COUNT 10
+#define EFFECT_NEAR 8      // splats beside the picture that reach into it; the Jacobian is clamped
+#define EFFECT_CAMERAS 9   // poses and intrinsics are trained beside the splats
+#define EFFECT_SURFACE 10  // terms of the loss that lay splats on surfaces
+#define EFFECT_COUNT 11
 
 #ifdef __cplusplus
 // Their names on the command line and in files, in the order of the numbers.
-#define EFFECT_NAMES \
-    "sh", "antialias", "exposure", "off_centre", "lens", "alpha", "depth", "huge", "near", "cameras"
+#define EFFECT_NAMES                                                                       \
+    "sh", "antialias", "exposure", "off_centre", "lens", "alpha", "depth", "huge", "near", \
+        "cameras", "surface"
 #endif
 
 #endif

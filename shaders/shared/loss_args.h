@@ -10,6 +10,10 @@
 #define LOSS_SIDE 26  // px, side of what a tile reads: 5 more on each side
 #define LOSS_SUM_THREADS 64  // threads of the one workgroup that adds the partial sums
 
+// Differences of depths in a pixel, as a share of its depth, beyond which they count as those of
+// two surfaces.
+#define DISTORTION_WIDTH 0.05
+
 #ifdef __cplusplus
 namespace darb::gpu {
 #endif
@@ -29,6 +33,7 @@ struct DepthLossArgs {
     uint pixels;    // H W
     uint measured;  // 1: the photo has depths behind its colours
     float scale;    // factor of the absolute difference: weight / (H W times the usual depth)
+    float distortion_scale;  // weight of the distortion / (H W)
 };
 
 struct LossSumArgs {

@@ -27,6 +27,7 @@ struct ProjectBackwardArgs {
     float largest_log_scale;  // no scale grows beyond it
     float clearance;          // world: splats nearer to the camera fade
     float rest_share;         // weight of one iteration's gradient in the mean that a step uses
+    float flatness_weight;    // weight of the sum of smallest scales, with FLATNESS
 };
 
 // What project_backward does with a splat's gradients: it takes the Adam step, stores them in the
@@ -43,7 +44,9 @@ struct AdamUpdateArgs {
     float inverse_sqrt_correction2;      // as in ProjectBackwardArgs
     float beta1, share1, beta2, share2;  // share = 1 - beta
     float gradient_scale;                // factor for what the buffers of gradients hold
-    float weight;  // weight of the attribute's regulariser in each view's loss
+    float weight;           // weight of the attribute's regulariser in each view's loss
+    float flatness_weight;  // STEP_SCALE with FLATNESS: as in ProjectBackwardArgs, in each view's
+                            // loss
     // share of the views that do not show a splat in which the regularisers act all the same
     float regularise_unseen;
     float largest;     // STEP_SCALE: no value grows beyond it
@@ -118,8 +121,8 @@ struct ResetOpacityArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ProjectBackwardArgs) == 44 + 4 * ATTRIBUTES);
-static_assert(sizeof(AdamUpdateArgs) == 56);
+static_assert(sizeof(ProjectBackwardArgs) == 48 + 4 * ATTRIBUTES);
+static_assert(sizeof(AdamUpdateArgs) == 60);
 }  // namespace darb::gpu
 #endif
 #endif

@@ -176,6 +176,32 @@ TEST_F(PassSpirv, loss_without_alpha_reads_neither_alpha_nor_background) {
     EXPECT_GT(masked.instructions, none.instructions);
 }
 
+// Constant 32 is DEPTH_SUM, 35 DEPTH_SPREAD, 36 FLATNESS; 3 of depth_loss is MEASURED, 2 of
+// adam_update STEP.
+TEST_F(PassSpirv, what_lays_splats_on_surfaces_is_not_there_where_it_is_off) {
+    for (const char* pass :
+         {"blend", "blend_records", "blend_backward", "blend_backward_team", "bucket_behind",
+          "blend_backward_pixels", "blend_backward_buckets", "depth_loss"}) {
+        SCOPED_TRACE(pass);
+        const Left none = left_in(pass, "32:0 35:0"), sum = left_in(pass, "32:1 35:0"),
+                   spread = left_in(pass, "32:1 35:1");
+        EXPECT_GT(spread.instructions, sum.instructions);
+        EXPECT_GT(spread.accesses, sum.accesses);
+        if (pass != std::string("depth_loss")) {
+            EXPECT_GT(sum.instructions, none.instructions);
+        }
+    }
+    EXPECT_GT(left_in("depth_loss", "3:1 35:1").instructions,
+              left_in("depth_loss", "3:0 35:1").instructions);
+    for (const char* values : {"3:0 36:", "2:1 36:"}) {  // UPDATE_ADAM, and STEP_SCALE
+        const char* pass = values[0] == '3' ? "project_backward" : "adam_update";
+        const Left rounder = left_in(pass, values + std::string("0")),
+                   flatter = left_in(pass, values + std::string("1"));
+        EXPECT_GT(flatter.instructions, rounder.instructions) << pass;
+        EXPECT_GT(flatter.accesses, rounder.accesses) << pass;
+    }
+}
+
 // Constant 1 of emit is COOPERATE, 4 of blend is SEGMENT.
 TEST_F(PassSpirv, frames_without_huge_splats_know_no_list_of_huge_splats_and_no_segments) {
     const Left alone = left_in("emit", "1:0"), cooperating = left_in("emit", "1:1");

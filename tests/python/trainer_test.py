@@ -34,6 +34,7 @@ OTHER = {
     "footprint": "exact", "alpha_cutoff": "1/1024", "transmittance_stop": "1e-6",
     "storage": "float16", "depth_order": "centre16", "iterations": 6, "batch": 2, "seed": 7,
     "max_splats": 900, "max_memory": "1.5GB", "sh_degree": 1, "depth_weight": 0.25,
+    "surface_from": 0.25, "distortion_weight": 0.5, "flatness_weight": 0.5,
     "camera_lr": 0.5, "camera_from": 0.25, "camera_anchor": 0.5, "exposure_grid": True,
     "exposure_lr_init": 0.002, "exposure_lr_final": 0.0005, "white_background": True,
     "random_background": False, "resolution_ramp": "off", "lambda_dssim": 0.25,

@@ -182,6 +182,35 @@ TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     EXPECT_EQ(after.parameters[kPosition], state.parameters[kPosition]);
 }
 
+// An unseen splat whose gradient is that of the regularisers alone: weight s of the smallest scale,
+// of the first of equal ones, and none beyond the limit.
+TEST(AdamUpdate, flatness_shortens_the_smallest_axis_alone) {
+    Training training(20);
+    training.partials.count.assign(20, 0);
+    PassState state = start_state(training.scene.model);
+    std::vector<float>& scales = state.parameters[kLogScale];
+    for (size_t c = 0; c < 3; ++c) scales[c] = -1;
+    for (size_t c = 3; c < 6; ++c) scales[c] = -100;
+    AdamStep step = adam_step(kRates, 1);
+    step.flatness_weight = 0.7f;
+    step.regularise_unseen = true;
+    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3,
+                                              UPDATE_ADAM, state, training.partials, step);
+    for (size_t i = 0; i < 20; ++i) {
+        const auto first = scales.begin() + std::ptrdiff_t(3 * i);
+        const auto least = static_cast<size_t>(std::min_element(first, first + 3) - first);
+        for (size_t c = 0; c < 3; ++c) {
+            const double scale =
+                c == least && i != 1 ? std::exp(double(first[std::ptrdiff_t(c)])) : 0;
+            EXPECT_NEAR(after.moments[kLogScale][2 * (3 * i + c)], 0.1 * 0.7 * scale,
+                        1e-6 * (1 + scale))
+                << i << " " << c;
+        }
+    }
+    EXPECT_NE(after.parameters[kLogScale], state.parameters[kLogScale]);
+    EXPECT_EQ(after.parameters[kOpacityLogit], state.parameters[kOpacityLogit]);
+}
+
 // Adam would turn these into full steps, although no photo has said anything yet.
 TEST(AdamUpdate, regularisers_leave_what_the_frame_does_not_show) {
     Training training(20);

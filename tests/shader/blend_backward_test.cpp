@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Every way of the backward blend alone, blend_backward.comp and those with _team, _buckets and
 // _pixels, against the reference: one gradient for each splat-tile intersection.
+#include "engine/reference/reference_loss.h"
 #include "tests/support/blend_scene.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/every_kernel.h"
@@ -61,6 +62,33 @@ void expect_gradients_match(const Result& r, const Tolerance& allowed, bool shap
         check(fmt::format("d_colour.{}", c).c_str(), [c](const auto& p) { return p.d_colour[c]; });
 }
 
+/// Adds a plane of random numbers, and returns it.
+Image<double> add_random_plane(const BlendScene& scene, Pcg32& rng, std::vector<float>& planes) {
+    Image<double> plane(scene.width, scene.height, 1);
+    for (double& d : plane.data) {
+        planes.push_back(static_cast<float>(rng.uniform(-1, 1)));
+        d = planes.back();
+    }
+    return plane;
+}
+
+/// Adds the planes of squares and of z0, and turns the other two, which so far stand for sums of z
+/// - z0, to gradients of sums of z.
+void add_spread_planes(const BlendScene& scene, const reference::TileLists& lists, Pcg32& rng,
+                       std::vector<float>& planes, Image<double>& d_alpha, Image<double>& d_depth) {
+    const Image<double> d_square = add_random_plane(scene, rng, planes);
+    const DepthPlanes picture(scene, blend_on_device(scene, lists).image);
+    planes.insert(planes.end(), picture.first.begin(), picture.first.end());
+    Image<double> both(scene.width, scene.height, 2);
+    for (size_t p = 0; p < d_square.data.size(); ++p) {
+        const double first = picture.first[p], by_square = d_square.data[p];
+        d_alpha.data[p] += first * (first * by_square - d_depth.data[p]);
+        both.data[2 * p] = d_depth.data[p] - 2 * first * by_square;
+        both.data[2 * p + 1] = by_square;
+    }
+    d_depth = both;
+}
+
 /// Compares the way of going back that the scene names.
 Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed) {
     const size_t pixels = size_t(scene.width) * scene.height;
@@ -73,15 +101,10 @@ Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed
             d_colour.data[i * 3 + c] = planes[c * pixels + i];
         }
     Image<double> d_alpha, d_depth;
-    for (Image<double>* plane : {&d_alpha, &d_depth}) {
-        if (!scene.depth_sum) continue;
-        *plane = Image<double>(scene.width, scene.height, 1);
-        for (double& d : plane->data) {
-            planes.push_back(static_cast<float>(rng.uniform(-1, 1)));
-            d = planes.back();
-        }
-    }
+    for (Image<double>* plane : {&d_alpha, &d_depth})
+        if (scene.depth_sum) *plane = add_random_plane(scene, rng, planes);
     Result r{scene.lists(), {}, {}, {}};
+    if (scene.depth_spread) add_spread_planes(scene, r.lists, rng, planes, d_alpha, d_depth);
     r.truth.resize(r.lists.intersection_count());
     for (size_t t = 0; t < r.lists.tile_count(); ++t)
         reference::blend_tile_backward(r.lists, t, scene.splats, scene.table(), scene.settings(),
@@ -163,6 +186,55 @@ TEST_P(EveryWay, gradients_of_summed_depths_match_double) {
         const BlendOutput without = blend_on_device(scene, r.lists);
         EXPECT_TRUE(std::equal(without.image.begin(), without.image.end(), r.out.image.begin()));
     }
+}
+
+// In parts, between which the picture holds the sums; in one piece below.
+TEST_P(EveryWay, gradients_of_squared_depths_match_double) {
+    BlendScene scene = empty_scene(53, 37);
+    scene.depth_sum = scene.depth_spread = true;
+    scene.segment = 128;
+    scene.add_random(900, 4, 0.01, 0.9);
+    for (auto& s : scene.splats) s.depth = 1 + s.depth / 256;
+    const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
+    EXPECT_NE(r.out.intersections[0].d_depth, 0);
+    scene.depth_sum = scene.depth_spread = false;
+    const BlendOutput without = blend_on_device(scene, r.lists);
+    EXPECT_TRUE(std::equal(without.image.begin(), without.image.end(), r.out.image.begin()));
+}
+
+// The distortion of depths 0.01 apart at a distance of 1,000, where float has steps of 6e-5.
+TEST_P(EveryWay, gradients_of_the_spread_of_depths_far_away_match_double) {
+    BlendScene scene = empty_scene(53, 37);
+    scene.depth_sum = scene.depth_spread = true;
+    scene.add_random(400, 4, 0.01, 0.9);
+    for (size_t i = 0; i < scene.splats.size(); ++i)
+        scene.splats[i].depth = static_cast<float>(1000 + 0.01 * double(i % 97) / 97.0);
+    Result r{scene.lists(), {}, {}, {}};
+    const size_t pixels = size_t(scene.width) * scene.height;
+    const BlendOutput picture = blend_on_device(scene, r.lists);
+    const DepthPlanes depths(scene, picture.image);
+    const auto exact =
+        reference::distortion(blend_in_double(scene, r.lists), double(pixels) * 1e6 * 1e4);
+    std::vector<float> planes(7 * pixels, 0.0f);
+    for (size_t p = 0; p < pixels; ++p) {  // as depth_loss.comp has them
+        const float cover = 1 - picture.transmittance[p], sum = depths.sum[p];
+        const float depth = depths.first[p] + sum / std::max(cover, 1e-9f);
+        const float share = 8e12f / (depth * depth);  // 2e10 over the square of the width
+        planes[3 * pixels + p] = share * depths.square[p];
+        planes[4 * pixels + p] = -2 * share * sum;
+        planes[5 * pixels + p] = share * cover;
+        planes[6 * pixels + p] = depths.first[p];
+    }
+    r.truth.resize(r.lists.intersection_count());
+    for (size_t t = 0; t < r.lists.tile_count(); ++t)
+        reference::blend_tile_backward(
+            r.lists, t, scene.splats, scene.table(), scene.settings(),
+            {Image<double>(scene.width, scene.height, 3), exact.d_alpha, exact.d_depth},
+            r.truth.data() + r.lists.begin[t]);
+    r.out = blend_on_device(scene, r.lists, true, planes);
+    r.got = gradients_of(scene, r.lists, r.out);
+    expect_gradients_match(r, tolerance("gradient_scaled_float32"), false);
+    EXPECT_NE(r.out.intersections[0].d_depth, 0);
 }
 
 // The kernels' own code is that of the other way, so that one case of each is enough.

@@ -200,6 +200,40 @@ TEST(BlendCases, records_keep_the_sum_of_depths) {
                 tolerance("image_float32")));
 }
 
+// Depths 0.01 apart at a distance of 1,000: the difference of the sums themselves would be a
+// hundred times smaller than their rounding. In front of some a splat that is hardly there.
+TEST(BlendCases, spreads_of_depths_far_away_keep_their_digits) {
+    for (const bool records : {false, true})
+        for (const bool floater : {false, true}) {
+            SCOPED_TRACE(fmt::format("records {}, floater {}", records, floater));
+            BlendScene scene = kCosine.scene(53, 37);
+            scene.records = records;
+            scene.depth_sum = scene.depth_spread = true;
+            if (floater) scene.add({26, 18}, {4e4, 0, 4e4}, 0.0045, {1, 1, 1});
+            scene.add_random(900, 4, 0.01, 0.9);
+            for (size_t i = 0; i < scene.splats.size(); ++i)
+                scene.splats[i].depth =
+                    floater && i == 0 ? 1 : static_cast<float>(1000 + 0.01 * double(i % 97) / 97.0);
+            const reference::TileLists lists = scene.lists();
+            const BlendOutput out = blend_on_device(scene, lists);
+            // Counted from 1,000, as double would lose digits, too; the spread is the same.
+            for (auto& s : scene.splats) s.depth -= 1000;
+            const reference::BlendImages<double> truth = blend_in_double(scene, lists);
+            const DepthPlanes planes(scene, out.image);
+            double largest = 0;
+            for (size_t p = 0; p < truth.depth.data.size(); ++p) {
+                const double cover = 1 - truth.transmittance.data[p];
+                const double exact =
+                    cover * truth.square.data[p] - std::pow(truth.depth.data[p], 2);
+                largest = std::max(largest, exact);
+                EXPECT_NEAR(planes.spread(p, 1 - double(out.transmittance[p])), exact,
+                            1e-3 * exact + 1e-12)
+                    << p;
+            }
+            EXPECT_GT(largest, floater ? 1e3 : 1e-6);
+        }
+}
+
 TEST(BlendCases, a_second_run_by_records_gives_the_same_bits) {
     BlendScene scene = kCosine.scene(53, 37);
     scene.records = true;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The loss of measured depths: its pass against double; its gradient through blending, by every
-// parameter and by the camera, against the reference, which is tested against differences; and
-// smaller photos.
+// The loss of measured depths and the distortion: its pass against double; its gradient through
+// blending, by every parameter and by the camera, against the reference, which is tested against
+// differences; and smaller photos.
 #include "trainer/step/step.h"
 
 #include "engine/core/rng.h"
@@ -9,6 +9,7 @@
 #include "engine/raster/camera_sums.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
+#include "engine/reference/reference_loss.h"
 #include "engine/reference/reference_render.h"
 #include "tests/support/camera_moves.h"
 #include "tests/support/compare_arrays.h"
@@ -22,6 +23,7 @@ namespace {
 
 constexpr float kWeight = 0.5f;
 constexpr double kUsual = 3;
+constexpr float kDistortion = 0.7f;
 
 /// uint [pixels] colours with every 7th pixel transparent, then float [pixels] depths with every
 /// 5th not measured.
@@ -41,12 +43,17 @@ float depth_of(const std::vector<std::uint32_t>& words, std::size_t p) {
     return depth;
 }
 
-/// dL/d(cover) and dL/d(sum w z) in double.
+/// Which of the terms take part.
+struct Terms {
+    bool measured = true, distortion = false;
+};
+
+/// dL/d(cover) and dL/d(sum w z) in double, and dL/d(sum w z z) in a second channel of sum.
 struct DepthGradient {
     Image<double> cover, sum;
 };
-DepthGradient gradient_in_double(const reference::RenderResult& r,
-                                 const std::vector<std::uint32_t>& photo, bool use_alpha) {
+DepthGradient gradient_of_measured(const reference::RenderResult& r,
+                                   const std::vector<std::uint32_t>& photo, bool use_alpha) {
     const Image<double>& t = r.images.transmittance;
     DepthGradient d{Image<double>(t.width, t.height, 1), Image<double>(t.width, t.height, 1)};
     const auto pixels = static_cast<double>(t.data.size());
@@ -61,16 +68,46 @@ DepthGradient gradient_in_double(const reference::RenderResult& r,
     return d;
 }
 
-ForwardOptions depth_options(const ProjectionEffects& effects) {
+DepthGradient gradient_in_double(const reference::RenderResult& r,
+                                 const std::vector<std::uint32_t>& photo, const Terms& terms) {
+    std::vector<bool> left_out;
+    for (std::size_t p = 0; 2 * p < photo.size(); ++p) left_out.push_back(photo[p] < 0x80000000u);
+    const auto distortion =
+        reference::distortion(r.images, terms.distortion ? kDistortion : 0, left_out);
+    DepthGradient d{distortion.d_alpha, distortion.d_depth};
+    if (!terms.measured) return d;
+    const DepthGradient measured = gradient_of_measured(r, photo, true);
+    for (std::size_t p = 0; p < d.cover.data.size(); ++p) {
+        d.cover.data[p] += measured.cover.data[p];
+        d.sum.data[2 * p] += measured.sum.data[p];
+    }
+    return d;
+}
+
+/// Planes of gradients of sums of z from what stands for sums of z - z0, with z0 the last plane.
+std::vector<double> planes_of_sums(const std::vector<float>& planes) {
+    const std::size_t pixels = planes.size() / 4;
+    std::vector<double> all(planes.begin(), planes.begin() + std::ptrdiff_t(3 * pixels));
+    for (std::size_t p = 0; p < pixels; ++p) {
+        const double first = planes[3 * pixels + p], by_square = all[2 * pixels + p];
+        all[p] += first * (first * by_square - all[pixels + p]);
+        all[pixels + p] -= 2 * first * by_square;
+    }
+    return all;
+}
+
+ForwardOptions depth_options(const ProjectionEffects& effects, bool spread) {
     ForwardOptions options;
     options.store_for_backward = options.depth_sum = options.camera_gradient = true;
+    options.depth_spread = spread;
     options.effects = effects;
     return options;
 }
 
-void expect_gradients_match(const TestScene& scene, const ProjectionEffects& effects) {
+void expect_gradients_match(const TestScene& scene, const ProjectionEffects& effects,
+                            const Terms& terms = {}) {
     Device& device = shared_device();
-    const ForwardOptions options = depth_options(effects);
+    const ForwardOptions options = depth_options(effects, terms.distortion);
     FrameBuffers buffers(device, options);
     Forward forward(device, options);
     Backward backward(device, options);
@@ -78,7 +115,7 @@ void expect_gradients_match(const TestScene& scene, const ProjectionEffects& eff
     GradientBuffers gradients(device, splats);
     const auto pixels = static_cast<std::uint32_t>(scene.camera.width * scene.camera.height);
     const std::vector<std::uint32_t> words = measured_photo(pixels);
-    Buffer photo(device, "photo", pixels * 8), d_image(device, "d_image", pixels * 20);
+    Buffer photo(device, "photo", pixels * 8), d_image(device, "d_image", pixels * 28);
     photo.upload(words);
     const std::vector<float> zeros(3 * pixels, 0.0f);
     d_image.upload(zeros);
@@ -89,7 +126,7 @@ void expect_gradients_match(const TestScene& scene, const ProjectionEffects& eff
     buffers.reserve(splats.count(), 20'000, scene.camera.width, scene.camera.height);
     Frame& frame = buffers.frame();
     backward.reserve(splats.count(), buffers.size().intersections, frame.checkpoint_records());
-    DepthLoss loss(device, true, false);
+    DepthLoss loss(device, {.measured = terms.measured, .spread = terms.distortion});
     CameraSums sums(device);
     sums.reserve(splats.count());
     Commands commands(device);
@@ -97,7 +134,7 @@ void expect_gradients_match(const TestScene& scene, const ProjectionEffects& eff
     forward.record(commands, splats, view, frame);
     loss.record(commands,
                 {frame.images.image, frame.images.final_transmittance, photo, d_image, true},
-                pixels, kWeight, kUsual);
+                pixels, {kWeight, kUsual, kDistortion});
     backward.record_gradients(commands, view, frame, splats, d_image,
                               {gradients, false, &sums.shares()});
     sums.record(commands, splats.count(), gradients.of(kPosition));
@@ -106,11 +143,16 @@ void expect_gradients_match(const TestScene& scene, const ProjectionEffects& eff
 
     reference::RenderSettings settings;
     const auto truth = reference::render(scene.model, scene.camera, settings);
-    const DepthGradient d = gradient_in_double(truth, words, true);
+    const DepthGradient d = gradient_in_double(truth, words, terms);
     std::vector<double> planes = d.cover.data;
-    planes.insert(planes.end(), d.sum.data.begin(), d.sum.data.end());
+    for (std::size_t channel = 0; channel < (terms.distortion ? 2 : 1); ++channel)
+        for (std::size_t p = 0; p < pixels; ++p) planes.push_back(d.sum.data[2 * p + channel]);
+    const std::vector<float> behind =
+        d_image.download<float>((terms.distortion ? 4 : 2) * pixels, 12 * pixels);
     EXPECT_GT(std::count_if(planes.begin(), planes.end(), [](double v) { return v != 0; }), 200);
-    EXPECT_TRUE(compare_scaled("d_image", planes, d_image.download<float>(2 * pixels, 12 * pixels),
+    EXPECT_TRUE(compare_scaled("d_image", planes,
+                               terms.distortion ? planes_of_sums(behind)
+                                                : std::vector<double>(behind.begin(), behind.end()),
                                Tolerance{"d_image", 1e-3, 1e-4, 0.01}));
     const auto expected = reference::backward(
         scene.model, scene.camera, settings, truth,
@@ -148,6 +190,18 @@ TEST(DepthLoss, gradients_match_double_through_a_lens_with_antialiasing) {
     expect_gradients_match(scene, {.antialias = true, .lens = true});
 }
 
+TEST(DepthLoss, gradients_of_the_distortion_match_double) {
+    expect_gradients_match(random_scene({.count = 80, .width = 70, .height = 50, .seed = 12}), {},
+                           {.measured = false, .distortion = true});
+}
+
+TEST(DepthLoss, gradients_of_both_match_double_through_a_lens_with_antialiasing) {
+    TestScene scene =
+        random_scene({.count = 80, .width = 70, .height = 50, .antialias = true, .seed = 13});
+    scene.camera.lens = test_lenses().front().second;
+    expect_gradients_match(scene, {.antialias = true, .lens = true}, {.distortion = true});
+}
+
 /// The two planes that the pass leaves of a picture of one depth and cover.
 std::vector<float> planes_of(const std::vector<std::uint32_t>& photo, bool measured, bool add) {
     Device& device = shared_device();
@@ -158,11 +212,11 @@ std::vector<float> planes_of(const std::vector<std::uint32_t>& photo, bool measu
     image.upload(std::vector<float>(4 * pixels, 3.0f));
     open.upload(std::vector<float>(pixels, 0.25f));
     d_image.upload(std::vector<float>(5 * pixels, 7.0f));
-    DepthLoss loss(device, true, add);
+    DepthLoss loss(device, {.exposure = add});
     Commands commands(device);
     commands.begin();
     loss.record(commands, {image, open, words, d_image, measured},
-                static_cast<std::uint32_t>(pixels), kWeight, kUsual);
+                static_cast<std::uint32_t>(pixels), {kWeight, kUsual, kDistortion});
     commands.submit_and_wait();
     EXPECT_EQ(d_image.download<float>(3 * pixels), std::vector<float>(3 * pixels, 7.0f));
     return d_image.download<float>(2 * pixels, 12 * pixels);

@@ -53,6 +53,7 @@ PassState step_from_buffers(const SplatModel& model, const Camera& camera, int d
     const auto n = static_cast<float>(model.size());
     step.opacity_weight *= n;  // the class takes weights of means
     step.scale_weight *= 3 * n;
+    step.flatness_weight *= n;
     AdamUpdate update(device);
     Commands commands(device);
     commands.begin();
@@ -130,6 +131,12 @@ AdamStep rates_with_all_rules() {
     step.largest_log_scale = -1.5f;
     step.clearance = 3;
     return step;
+}
+
+TEST(GradientStep, both_ways_shorten_the_same_axis) {
+    AdamStep step = rates_with_all_rules();
+    step.flatness_weight = 5e-3f;
+    compare_ways(random_scene({.count = kSplats, .sh_degree = 1, .seed = 72}), 1, step);
 }
 
 // Footprints differ in the projection alone, which both ways share: exact for one kernel.

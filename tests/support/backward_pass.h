@@ -83,6 +83,7 @@ inline gpu::ProjectBackwardArgs backward_args(std::uint32_t splats, const AdamSt
     args.inverse_sqrt_correction2 = step.inverse_sqrt_correction2;
     args.opacity_weight = step.opacity_weight;
     args.scale_weight = step.scale_weight;
+    args.flatness_weight = step.flatness_weight;
     args.regularise_unseen = step.regularise_unseen > 0 ? 1u : 0u;
     args.largest_log_scale = step.largest_log_scale;
     args.clearance = step.clearance;
@@ -105,6 +106,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     constants["SH_STORED"] = model.sh_degree;
     constants["UPDATE"] = update;
     constants["REST"] = step.rest;
+    constants["FLATNESS"] = step.flatness_weight > 0 ? 1 : 0;
     constants["SUMS_BY_CHUNKS"] = by_chunks ? 1 : 0;
     add_constants(effects, constants);
     const Pipeline pipeline(device, "project_backward", constants);

@@ -30,7 +30,8 @@ struct BlendScene {
     std::uint32_t threads = 0;  // in a workgroup of blend.comp; 0: one subgroup per block
     bool records = false;       // blend_records.comp in its place
     BackwardBlend back = BackwardBlend::subgroup;
-    bool depth_sum = false;  // as ForwardOptions: d_image has five planes
+    // As ForwardOptions: d_image has five planes, and seven with depth_spread.
+    bool depth_sum = false, depth_spread = false;
     std::vector<reference::ProjectedSplat<double>> splats;  // nearest first
 
     bool buckets() const { return back == BackwardBlend::buckets; }
@@ -238,6 +239,7 @@ struct BlendPipelines {
         bucket = bucket_length(device);
         constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
         constants["DEPTH_SUM"] = constants["ALPHA_GRADIENT"] = scene.depth_sum ? 1 : 0;
+        constants["DEPTH_SPREAD"] = scene.depth_spread ? 1 : 0;
         constants["BUCKET"] = static_cast<std::int32_t>(bucket);
         constants = for_several_passes(constants);
         const bool several = writes_every_slot(scene.back);
@@ -282,16 +284,19 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     }
     const size_t pixels = size_t(scene.width) * scene.height,
                  intersections = lists.intersection_count();
-    const size_t more = scene.depth_sum ? 1 : 0;  // planes, and sums of an intersection
+    const size_t more = scene.depth_sum ? 1 : 0;  // sums of an intersection
+    const size_t planes = scene.depth_spread ? 6 : 3 + more;
+    const size_t checkpoint_planes = scene.depth_spread ? 6 : 4 + more;
     const size_t records = intersections / pipelines.bucket + lists.tile_count();
     const float start = writes_every_slot(scene.back) ? NAN : 0.0f;
     // A record that no pixel reaches must not be read: NaN would show.
-    const std::vector<float> unwritten(scene.buckets() ? records * 256 * (4 + more) : 1, NAN);
+    const std::vector<float> unwritten(scene.buckets() ? records * 256 * checkpoint_planes : 1,
+                                       NAN);
     const GuardedBuffer ranges(device, "tile range", shuffled.ranges),
         order(device, "intersection from sorted", shuffled.order),
         splats(device, "splat from intersection", shuffled.splat_from_intersection),
         shapes(device, "shape", shape), lights(device, "light", light),
-        bounds(device, "bound", bound), image(device, "image", pixels * (12 + 4 * more)),
+        bounds(device, "bound", bound), image(device, "image", pixels * 4 * planes),
         final_t(device, "final T", store || scene.segment > 0 ? pixels * 4 : 4),
         behind(device, "behind", scene.segment > 0 ? pixels * 4 : 4),
         last(device, "last intersection", store ? pixels * 4 : 4),
@@ -371,12 +376,32 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     return out;
 }
 
+/// The last planes of a picture with depth_spread: sums over splats of w (z - z0) and of its
+/// square, and z0.
+struct DepthPlanes {
+    std::vector<float> sum, square, first;
+
+    DepthPlanes(const BlendScene& scene, const std::vector<float>& image) {
+        const auto pixels = std::ptrdiff_t{scene.width} * scene.height;
+        for (std::vector<float>* plane : {&sum, &square, &first}) {
+            const auto at =
+                image.begin() + (3 + (plane == &square) + 2 * (plane == &first)) * pixels;
+            plane->assign(at, at + pixels);
+        }
+    }
+    /// W sum(w z z) - sum(w z)^2 of a pixel, which does not depend on z0.
+    double spread(size_t pixel, double cover) const {
+        return cover * double(square[pixel]) - double(sum[pixel]) * double(sum[pixel]);
+    }
+};
+
 inline reference::BlendImages<double> blend_in_double(const BlendScene& scene,
                                                       const reference::TileLists& lists) {
     reference::BlendImages<double> images{Image<double>(scene.width, scene.height, 3),
                                           Image<double>(scene.width, scene.height, 1),
                                           Image<double>(scene.width, scene.height, 1),
-                                          Image<std::int32_t>(scene.width, scene.height, 1)};
+                                          Image<std::int32_t>(scene.width, scene.height, 1),
+                                          Image<double>(scene.width, scene.height, 1)};
     for (size_t t = 0; t < lists.tile_count(); ++t)
         reference::blend_tile(lists, t, scene.splats, scene.table(), scene.settings(), images);
     return images;

@@ -27,6 +27,9 @@ const std::map<std::string, std::string> kOtherValues{
     {"/effects/exposure_lr/0", "0.3"},
     {"/effects/exposure_lr/1", "0.3"},
     {"/effects/depth_weight", "3"},
+    {"/effects/surface_from", "0.2"},
+    {"/effects/distortion_weight", "3"},
+    {"/effects/flatness_weight", "3"},
     {"/effects/camera_lr", "0.7"},
     {"/effects/camera_from", "0.5"},
     {"/effects/camera_anchor", "3"},
@@ -107,6 +110,8 @@ TinyTraining run_for(const OptionRow& row) {
     o.clearance = 0.9f;
     o.exposure = key.starts_with("/effects/exposure_");
     o.depth = key == "/effects/depth_weight";
+    o.surface = key.starts_with("/effects/surface_") || key == "/effects/distortion_weight" ||
+                key == "/effects/flatness_weight";
     if (key.starts_with("/effects/depth"))
         add_measured_depths(tiny_truth({.width = 32, .height = 24}), t);
     o.refine_cameras = key.starts_with("/effects/camera_");
@@ -167,6 +172,7 @@ TEST(OptionEffect, another_value_of_each_option_trains_another_scene_long) {
                                 (special ? key : "") + (t.options.exposure ? "exposure" : "") +
                                 (t.dataset.views[0].depth.empty() ? "" : "depths") +
                                 (t.options.depth ? " compared" : "") +
+                                (t.options.surface ? "surface" : "") +
                                 (t.options.refine_cameras ? "cameras" : "") +
                                 (t.options.learn_kernel > 0 ? "learned" : "");
         if (!usual_of.contains(run)) usual_of[run] = trained(t);

@@ -60,6 +60,8 @@ std::vector<TrainCostRow> departures(const Schedule& schedule) {
     add(options.exposure ? "without exposure" : "with exposure",
         [](TrainOptions& o) { o.exposure = !o.exposure; });
     if (options.depth) add("without measured depths", [](TrainOptions& o) { o.depth = false; });
+    if (options.surface)
+        add("without terms of surfaces", [](TrainOptions& o) { o.surface = false; });
     add(options.resolution_ramp ? "without resolution ramp" : "with resolution ramp",
         [](TrainOptions& o) { o.resolution_ramp = !o.resolution_ramp; });
     if (options.sh_degree > 0)

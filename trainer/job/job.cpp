@@ -65,6 +65,12 @@ void plan_effects(TrainJob& job, bool looks) {
     if (!t.depth && t.depth_weight != usual.depth_weight)
         job.notes.emplace_back(
             "--depth-weight is not used: measured depths are compared with --effects +depth");
+    if (!t.surface &&
+        (t.surface_from != usual.surface_from || t.distortion_weight != usual.distortion_weight ||
+         t.flatness_weight != usual.flatness_weight))
+        job.notes.emplace_back(
+            "--surface-from, --distortion-weight and --flatness-weight are not used: splats are "
+            "laid on surfaces with --effects +surface");
 }
 
 void plan_strategy(TrainJob& job) {
@@ -206,6 +212,7 @@ void apply_plan(const EffectPlan& plan, TrainOptions& options) {
     options.exposure = plan.on(EFFECT_EXPOSURE);
     options.depth = plan.on(EFFECT_DEPTH);
     options.refine_cameras = plan.on(EFFECT_CAMERAS);
+    options.surface = plan.on(EFFECT_SURFACE);
     options.projection = plan.projection();
     options.alpha = plan.on(EFFECT_ALPHA);
     options.huge_splat_path = plan.huge_splat_path();

@@ -29,6 +29,9 @@ bool compares_depths(const Opt& o, const Sched&) {
 bool learns_kernel(const Opt& o, const Sched&) {
     return o.learn_kernel > 0;
 }
+bool lays_on_surfaces(const Opt& o, const Sched&) {
+    return o.surface;
+}
 // What the first strategy does not have stands only where it is, so that files from before it
 // agree.
 bool not_of_the_first(const Opt& o, const Sched&) {
@@ -132,6 +135,30 @@ const OptionRow kRows[] = {
      .help = "weight of measured depths in the loss, against the mean difference of the colours; "
              "the difference of a depth counts as a share of the usual depth",
      .stands = compares_depths},
+    {.setting = "/effects/surface",
+     .member = &Opt::surface,
+     .group = option_group::kEffects,
+     .stands = lays_on_surfaces},
+    {.flags = "--surface-from",
+     .setting = "/effects/surface_from",
+     .member = &Opt::surface_from,
+     .group = option_group::kEffects,
+     .help = "share of the run before the terms of --effects +surface count",
+     .most = 1,
+     .stands = lays_on_surfaces},
+    {.flags = "--distortion-weight",
+     .setting = "/effects/distortion_weight",
+     .member = &Opt::distortion_weight,
+     .group = option_group::kEffects,
+     .help = "weight of how far the splats of a pixel lie apart along its ray, where they lie "
+             "within a few hundredths of its depth; 0: none",
+     .stands = lays_on_surfaces},
+    {.flags = "--flatness-weight",
+     .setting = "/effects/flatness_weight",
+     .member = &Opt::flatness_weight,
+     .group = option_group::kEffects,
+     .help = "weight of the mean of the splats' smallest scales, in scene extents; 0: none",
+     .stands = lays_on_surfaces},
     {.setting = "/effects/alpha", .member = &Opt::alpha, .group = option_group::kEffects},
     {.setting = "/effects/cameras",
      .member = &Opt::refine_cameras,

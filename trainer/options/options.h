@@ -61,6 +61,12 @@ struct TrainOptions {
     // Rendered depths are compared with those that were measured: see depth_loss.h.
     bool depth = false;
     float depth_weight = 0.1f;
+    // Terms of the loss that lay splats on surfaces: the distortion of DepthLoss, and the
+    // regulariser of the smallest scales.
+    bool surface = false;
+    float surface_from = 0.5f;        // share of the run before these terms count
+    float distortion_weight = 0.03f;  // of splats of a pixel that lie apart along its ray
+    float flatness_weight = 0;        // of the mean of smallest scales, scene extents
     // Poses and intrinsics of the photos are trained beside the splats: see camera_refinement.h.
     bool refine_cameras = false;
     // px a visit, falling to a fiftieth over the run; absent: 0.1 where tracks anchor them, else

@@ -75,6 +75,11 @@ class Schedule {
     /// The last iteration with a round of density control or such a drop after it, or less.
     int last_change() const;
 
+    /// Whether the terms count at this iteration that lay splats on surfaces.
+    bool lays_on_surfaces(int iteration) const {
+        return options.surface && iteration > options.surface_from * double(options.iterations);
+    }
+
     /// The steps of the resolution ramp, smallest photos first: a quarter of the sides in the first
     /// tenth of the run, half up to 3/10 of it, the longest side never below 100 px; none where it
     /// is off. longest_side: of all photos, px.

@@ -41,6 +41,7 @@ FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
     size.bucket = FrameBuffers::bucket(device, demand.frame);
     size.shaped = kernel_has_shape(demand.frame.kernel);
     size.depth_sum = demand.frame.depth_sum;
+    size.depth_spread = demand.frame.depth_spread;
     return size;
 }
 

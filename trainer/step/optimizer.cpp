@@ -62,6 +62,8 @@ AdamStep Optimizer::of_batch(AdamStep step) const {
 AdamStep Optimizer::with_regularisers(AdamStep step, int iteration) const {
     step.opacity_weight = opacity_weight_;
     step.scale_weight = scale_weight_ / static_cast<float>(length());
+    if (schedule_.lays_on_surfaces(iteration))
+        step.flatness_weight = schedule_.options.flatness_weight / static_cast<float>(length());
     if (schedule_.largest_scale > 0)
         step.largest_log_scale =
             static_cast<float>(std::log(schedule_.largest_scale * schedule_.length_scale * reach_));

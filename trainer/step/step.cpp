@@ -13,20 +13,25 @@
 
 namespace darb {
 
-DepthLoss::DepthLoss(Device& device, bool use_alpha, bool exposure)
-    : pipeline_(
-          device, "depth_loss",
-          {{"THREADS", SPLAT_GROUP}, {"USE_ALPHA", use_alpha ? 1 : 0}, {"ADD", exposure ? 1 : 0}}) {
-}
+DepthLoss::DepthLoss(Device& device, const DepthLossOptions& options)
+    : pipeline_(device, "depth_loss",
+                {{"THREADS", SPLAT_GROUP},
+                 {"USE_ALPHA", options.use_alpha ? 1 : 0},
+                 {"ADD", options.exposure ? 1 : 0},
+                 {"MEASURED", options.measured ? 1 : 0},
+                 {"DEPTH_SUM", 1},
+                 {"DEPTH_SPREAD", options.spread ? 1 : 0}}) {}
 
 void DepthLoss::record(Commands& commands, const DepthLossBuffers& buffers, std::uint32_t pixels,
-                       float weight, double usual) {
+                       const DepthLossWeights& weights) {
     commands.pass("depth loss");
     const Groups g = groups_for(pixels);
-    const auto scale = static_cast<float>(weight / (static_cast<double>(pixels) * usual));
-    commands.dispatch(pipeline_, gpu::DepthLossArgs{pixels, buffers.measured ? 1u : 0u, scale},
-                      {buffers.image, buffers.transmittance, buffers.photo, buffers.d_image}, g.x,
-                      g.y);
+    const auto scale =
+        static_cast<float>(weights.measured / (static_cast<double>(pixels) * weights.usual));
+    const float distortion_scale = weights.distortion / static_cast<float>(pixels);
+    commands.dispatch(
+        pipeline_, gpu::DepthLossArgs{pixels, buffers.measured ? 1u : 0u, scale, distortion_scale},
+        {buffers.image, buffers.transmittance, buffers.photo, buffers.d_image}, g.x, g.y);
 }
 
 ForwardOptions forward_options(const TrainOptions& options) {
@@ -40,7 +45,8 @@ ForwardOptions forward_options(const TrainOptions& options) {
     f.store_for_backward = true;
     f.camera_gradient = options.refine_cameras;
     f.alpha_gradient = options.exposure;
-    f.depth_sum = options.depth;
+    f.depth_spread = options.surface && options.distortion_weight > 0;
+    f.depth_sum = options.depth || f.depth_spread;
     return f;
 }
 
@@ -85,7 +91,10 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& ph
       flights_{Flight(device), Flight(device)} {
     if (options.exposure)
         exposure_.emplace(device, exposure_maps(options, photos.count()), photos.largest_photo());
-    if (options.depth) depth_.emplace(device, loss.use_alpha, options.exposure);
+    const ForwardOptions forward = forward_options(options);
+    if (forward.depth_sum)
+        depth_.emplace(device, DepthLossOptions{loss.use_alpha, options.exposure, options.depth,
+                                                forward.depth_spread});
     if (steps_by_views(options)) adam_.emplace(device);
     if (options.refine_cameras) cameras_.emplace(device);
     if (options.learn_kernel > 0) profile_.emplace(device, forward_options(options));
@@ -190,7 +199,8 @@ void TrainingStep::record_back(Commands& commands, const StepInput& input) {
         depth_->record(commands,
                        {frame.images.image, frame.images.final_transmittance, *view.pixels,
                         d_image_, view.measured},
-                       view.size(), depth_weight_, photos_->usual_depth());
+                       view.size(),
+                       {depth_weight_, photos_->usual_depth(), input.distortion_weight});
     if (input.samples_profile) profile_->record(commands, view.frame, frame, d_image_);
     if (input.gradients) {
         backward_.record_gradients(

@@ -31,26 +31,43 @@
 
 namespace darb {
 
+// DepthLoss: what the loss says of the depths of a picture: measured depths, and the distortion.
+
 /// What a DepthLoss reads and writes, of one view.
 struct DepthLossBuffers {
-    const Buffer& image;          // float [4][H W] of ForwardOptions::depth_sum
+    const Buffer& image;  // float [4 or 6][H W] of ForwardOptions::depth_sum or depth_spread
     const Buffer& transmittance;  // float [H W]
     const Buffer& photo;          // uint [H W] R G B A and, where it is measured, float [H W]
-    const Buffer& d_image;        // float [5][H W]: the last two planes are written
+    const Buffer& d_image;        // float [5 or 7][H W]: what is behind the colours is written
     bool measured = false;
+};
+
+struct DepthLossOptions {
+    bool use_alpha = true;  // as in LossOptions
+    // The plane of dL/d(1 - transmittance) holds what Exposure::record_backward left, which is
+    // added to.
+    bool exposure = false;
+    bool measured = true;  // photos have measured depths
+    bool spread = false;   // ForwardOptions::depth_spread: the distortion counts
+};
+
+struct DepthLossWeights {
+    float measured = 0;
+    double usual = 1;  // world units: what makes the difference free of the scene's units
+    float distortion = 0;
 };
 
 class DepthLoss {
   public:
-    /// use_alpha: as in LossOptions. exposure: the plane of dL/d(1 - transmittance) holds what
-    /// Exposure::record_backward left, which is added to.
-    DepthLoss(Device& device, bool use_alpha, bool exposure);
+    DepthLoss(Device& device, const DepthLossOptions& options);
 
-    /// The gradient of weight times the mean over all pixels of |depth - measured| / usual, a pixel
-    /// without a measured depth having none. usual: world units, what makes it free of the scene's
-    /// units. Belongs to the pass "depth loss".
+    /// The gradient of weights.measured times the mean over all pixels of |depth - measured| /
+    /// usual, a pixel without a measured depth having none, and of weights.distortion times the
+    /// mean of p / (p + DISTORTION_WIDTH^2), p being the sum over pairs of splats of w_i w_j ((z_i
+    /// - z_j) / depth)^2, in which the pixel's depth is a constant. Belongs to the pass "depth
+    /// loss".
     void record(Commands& commands, const DepthLossBuffers& buffers, std::uint32_t pixels,
-                float weight, double usual);
+                const DepthLossWeights& weights);
 
   private:
     Pipeline pipeline_;
@@ -74,6 +91,7 @@ struct StepInput {
     int next_view = -1;  // the next step's view, where that is known
     AdamStep adam;
     float exposure_rate = 0;
+    float distortion_weight = 0;          // of DepthLossWeights
     int exposure_visits = 1;              // visits of this photo, including this step
     DensityStrategy* strategy = nullptr;  // that records into the step
     bool samples_profile = false;         // its sums for the gradient of a learned kernel are taken
@@ -185,7 +203,7 @@ class TrainingStep {
     Loss loss_;
     float lambda_dssim_;
     std::optional<Exposure> exposure_;  // options.exposure
-    std::optional<DepthLoss> depth_;    // options.depth
+    std::optional<DepthLoss> depth_;    // options.depth or a distortion
     float depth_weight_;
     std::optional<AdamUpdate> adam_;      // used for batches
     std::optional<CameraSums> cameras_;   // options.refine_cameras, of batches

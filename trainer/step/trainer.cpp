@@ -127,6 +127,8 @@ StepInput Trainer::input_for(int iteration, int view, int last) const {
         static_cast<float>(schedule_.options.clearance * photos_.nearest_distance(view));
     input.adam.splats_gone = totals_.counters.undrawn;
     input.exposure_rate = static_cast<float>(schedule_.exposure_rate(iteration));
+    if (schedule_.lays_on_surfaces(iteration))
+        input.distortion_weight = schedule_.options.distortion_weight;
     input.exposure_visits = (iteration - 1) / static_cast<int>(photos_.count()) + 1;
     input.strategy = strategy_.get();
     return input;

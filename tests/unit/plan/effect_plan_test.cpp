@@ -229,6 +229,21 @@ TEST(EffectPlanOfDataset, points_call_for_antialiasing) {
                      .on(EFFECT_ANTIALIAS));
 }
 
+TEST(EffectPlanOfDataset, surfaces_are_asked_for_by_name_alone) {
+    const Capture c;
+    for (const char* words : {"auto", "all", "none", "all,-surface"})
+        EXPECT_FALSE(plan_training(c.dataset, c.photos, 0, parse_effects(words)).on(EFFECT_SURFACE))
+            << words;
+    for (const char* words : {"+surface", "none,+surface"}) {
+        const EffectPlan plan = plan_training(c.dataset, c.photos, 0, parse_effects(words));
+        EXPECT_TRUE(plan.on(EFFECT_SURFACE) && plan.row(EFFECT_SURFACE).overridden) << words;
+    }
+    for (const EffectUse use : {EffectUse::pictures, EffectUse::measuring}) {
+        DatasetOptions data;
+        EXPECT_THROW(choose_effects("+surface", use, data), Error);
+    }
+}
+
 AntialiasProbe probe_of(std::vector<ProbedSize> sizes) {
     return {400, {}, {}, std::move(sizes)};
 }

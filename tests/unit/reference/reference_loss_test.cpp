@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The loss against an SSIM written out window by window, and its gradient against differences.
+// The loss against an SSIM written out window by window, and its gradient against differences; the
+// distortion of depths likewise.
 #include "engine/reference/reference_loss.h"
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "engine/core/rng.h"
@@ -159,6 +161,55 @@ TEST(ToUnitRange, Bytes_AreDividedBy255) {
     ImageU8 photo(1, 1, 3);
     photo.data = {0, 51, 255};
     EXPECT_EQ(to_unit_range<double>(photo).data, (std::vector<double>{0, 0.2, 1}));
+}
+
+// One pixel, three splats. D is held where it was.
+TEST(ReferenceDistortion, gradients_match_differences_of_the_sum_over_pairs) {
+    constexpr double kWeight = 0.7, kStep = 1e-6;
+    std::array<double, 3> weights{0.2, 0.45, 0.15}, depths{2.5, 2.6, 2.75};
+    const auto images_of = [&] {
+        BlendImages<double> images{Image<double>(1, 1, 3), Image<double>(1, 1, 1),
+                                   Image<double>(1, 1, 1), Image<std::int32_t>(1, 1, 1),
+                                   Image<double>(1, 1, 1)};
+        images.transmittance.data[0] = 1;
+        for (std::size_t i = 0; i < 3; ++i) {
+            images.transmittance.data[0] -= weights[i];
+            images.depth.data[0] += weights[i] * depths[i];
+            images.square.data[0] += weights[i] * depths[i] * depths[i];
+        }
+        return images;
+    };
+    const BlendImages<double> images = images_of();
+    const double at = images.depth.data[0] / (1 - images.transmittance.data[0]);
+    const auto over_pairs = [&] {
+        double sum = 0;
+        for (std::size_t i = 0; i < 3; ++i)
+            for (std::size_t j = 0; j < 3; ++j)
+                sum += weights[i] * weights[j] * std::pow((depths[i] - depths[j]) / at, 2);
+        return kWeight * sum / (sum + 0.05 * 0.05);
+    };
+    const DistortionResult got = distortion(images, kWeight);
+    EXPECT_NEAR(got.loss, over_pairs(), 1e-12);
+    const double by_sum = got.d_depth.data[0], by_square = got.d_depth.data[1];
+    for (std::size_t i = 0; i < 3; ++i) {
+        const auto difference = [&](double& value) {
+            const double kept = value;
+            value = kept + kStep;
+            const double above = over_pairs();
+            value = kept - kStep;
+            const double below = over_pairs();
+            value = kept;
+            return (above - below) / (2 * kStep);
+        };
+        const double z = depths[i];
+        EXPECT_NEAR(got.d_alpha.data[0] + z * (by_sum + z * by_square), difference(weights[i]),
+                    1e-8);
+        EXPECT_NEAR(weights[i] * (by_sum + 2 * z * by_square), difference(depths[i]), 1e-8);
+    }
+    EXPECT_EQ(distortion(images, kWeight, {true}).loss, 0);
+    BlendImages<double> empty = images;
+    empty.transmittance.data[0] = 1;
+    EXPECT_EQ(distortion(empty, kWeight).d_alpha.data[0], 0) << "nothing is there";
 }
 
 }  // namespace

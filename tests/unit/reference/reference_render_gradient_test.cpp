@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Every gradient of the reference against central differences of its own forward walk, for every
-// kernel and footprint, under random weights on colour, alpha and depth. A parameter whose two
-// renders blend a different set of samples sits on a cut-off: it is counted, and not compared.
+// kernel and footprint, under random weights on colour, alpha, depth and its square. A parameter
+// whose two renders blend a different set of samples sits on a cut-off: it is counted, and not
+// compared.
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
@@ -31,7 +32,7 @@ class Differences {
           settings_(settings),
           colour_weights_(random_weights(camera, 3, 11)),
           alpha_weights_(random_weights(camera, 1, 12)),
-          depth_weights_(random_weights(camera, 1, 13)),
+          depth_weights_(random_weights(camera, 2, 13)),
           result_(reference::render(splats, camera, settings)),
           gradients_(reference::backward(splats, camera, settings, result_, colour_weights_,
                                          alpha_weights_, depth_weights_)) {}
@@ -86,7 +87,8 @@ class Differences {
         double sum = weighted_sum(result.images.colour, colour_weights_);
         for (size_t i = 0; i < alpha_weights_.data.size(); ++i) {
             sum += (1 - result.images.transmittance.data[i]) * alpha_weights_.data[i] +
-                   result.images.depth.data[i] * depth_weights_.data[i];
+                   result.images.depth.data[i] * depth_weights_.data[2 * i] +
+                   result.images.square.data[i] * depth_weights_.data[2 * i + 1];
         }
         return sum;
     }

@@ -24,7 +24,7 @@ std::string other_value(const OptionRow& row) {
     }
     if (row.is_size) return "1.5GB";
     const bool counts = std::holds_alternative<int TrainOptions::*>(row.member) || row.least >= 1;
-    return row.most == 1 ? "0.5" : row.most == 3 ? "2" : counts ? "8" : "0.75";
+    return row.most == 1 ? "0.25" : row.most == 3 ? "2" : counts ? "8" : "0.75";
 }
 
 bool is_whole(const OptionRow& row) {
@@ -53,6 +53,8 @@ TEST(OptionTable, each_flag_that_changes_a_result_changes_its_setting_alone) {
         if (name == "--kernel-lr") options.learn_kernel = 3;
         if (name.starts_with("--camera-")) options.refine_cameras = true;
         if (name == "--depth-weight") options.depth = true;
+        options.surface = name == "--surface-from" || name == "--distortion-weight" ||
+                          name == "--flatness-weight";
         const Json before = settings_json(options);
         set_option(row, is_whole(row) ? "8" : other_value(row), options);
         const Json after = settings_json(options);
