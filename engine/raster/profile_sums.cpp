@@ -4,12 +4,12 @@
 #include <algorithm>
 
 #include "engine/core/error.h"
+#include "engine/raster/forward.h"
 
 namespace darb {
 
 namespace {
 
-constexpr std::uint32_t kBlocksATile = 4;
 constexpr std::uint64_t kSumBytes = PROFILE_SUMS * sizeof(float);
 
 }  // namespace
@@ -28,7 +28,9 @@ void ProfileSums::make_pipeline(bool segmented) {
     SpecConstants constants = kernel_constants(*device_, options_);
     constants["ALPHA_GRADIENT"] = options_.alpha_gradient || options_.depth_sum ? 1 : 0;
     constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
-    gradient_ = Pipeline(*device_, "profile_gradient", constants, false);
+    const std::uint32_t subgroup = add_block_constants(*device_, constants);
+    constants["THREADS"] = static_cast<std::int32_t>(subgroup);
+    gradient_ = Pipeline(*device_, "profile_gradient", constants, true, subgroup);
     segmented_ = segmented;
 }
 
@@ -38,8 +40,10 @@ void ProfileSums::set_kernel(int kernel) {
 }
 
 BufferList<ProfileSums> ProfileSums::frame_buffers(const FrameSize& size) {
-    return {{&ProfileSums::rows_, "profile rows", size.tiles * kBlocksATile * kSumBytes},
-            {&ProfileSums::state_, "profile state", size.list_segments > 1 ? size.pixels * 8 : 8}};
+    const std::uint64_t state = size.list_segments > 1 ? size.pixels * 4 : 4;
+    return {{&ProfileSums::rows_, "profile rows", size.tiles * kSumBytes},
+            {&ProfileSums::transmittance_, "profile transmittance", state},
+            {&ProfileSums::behind_, "profile behind", state}};
 }
 
 FrameBytes ProfileSums::device_bytes(const FrameSize& size) {
@@ -61,7 +65,7 @@ void ProfileSums::record(Commands& commands, const FrameView& view, const Frame&
     if (size.list_segments > 1 && !segmented_) make_pipeline(true);
     const gpu::CameraData& camera = view.camera;
     const std::uint32_t tiles_y = (camera.height + TILE_SIZE - 1) / TILE_SIZE;
-    const std::uint32_t rows = camera.tiles_x * tiles_y * kBlocksATile;
+    const std::uint32_t rows = camera.tiles_x * tiles_y;
     if (rows_.bytes() < rows * kSumBytes)
         throw Error("profile gradient", "a frame that is larger than the buffers",
                     "Call reserve after each growth of the frame.");
@@ -77,12 +81,17 @@ void ProfileSums::record(Commands& commands, const FrameView& view, const Frame&
     const TileIntersections& t = frame.intersections;
     const FrameImages& images = frame.images;
     commands.pass("profile gradient");
+    const bool parts = size.list_segments > 1;
+    if (parts)  // the pass keeps its state there, the backward blend begins with the frame's
+        commands.copy(images.final_transmittance, transmittance_,
+                      std::uint64_t{camera.width} * camera.height * 4);
     for (args.segment = args.segments; args.segment-- > 0;)
         commands.dispatch(
             gradient_, args,
             {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape, s.light,
-             s.bound, d_image, images.final_transmittance, images.last_intersection, rows_, state_},
-            2 * camera.tiles_x, 2 * tiles_y);
+             s.bound, d_image, parts ? transmittance_ : images.final_transmittance,
+             images.last_intersection, rows_, behind_},
+            camera.tiles_x, tiles_y);
     commands.dispatch(add_, gpu::ProfileSumArgs{rows}, {rows_, frame.counters.status, sums_}, 1);
 }
 

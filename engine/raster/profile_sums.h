@@ -46,7 +46,7 @@ class ProfileSums {
     ForwardOptions options_;
     bool segmented_ = false;
     Pipeline gradient_, add_;
-    Buffer rows_, state_, sums_;
+    Buffer rows_, transmittance_, behind_, sums_;
 };
 
 }  // namespace darb

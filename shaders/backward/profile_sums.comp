@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Adds up what profile_gradient.comp leaves of each block, in a fixed order, and adds the result to the sums of earlier
+// Adds up what profile_gradient.comp leaves of each tile, in a fixed order, and adds the result to the sums of earlier
 // iterations. Does nothing when a frame overflowed its intersection buffers.
 // Work: one workgroup, PROFILE_ADD_STRANDS threads for each sum: a thread adds every so-many-th row, a tree in shared
 // memory the threads.

@@ -11,15 +11,14 @@
 // dw/d(parameter) is a polynomial of sqrt(u) of a lower degree.
 #define PROFILE_SUMS 14
 
-#define PROFILE_BLOCK_THREADS 64  // a thread a pixel of a block of 8 x 8
-#define PROFILE_ADD_STRANDS 16    // threads that share the rows of one sum
+#define PROFILE_ADD_STRANDS 16  // threads that share the rows of one sum
 
 #ifdef __cplusplus
 namespace darb::gpu {
 #endif
 
 struct ProfileSumArgs {
-    uint rows;  // four blocks for each tile
+    uint rows;  // one a tile
 };
 
 #ifdef __cplusplus

@@ -65,22 +65,26 @@ std::vector<float> sums_on_device(const BlendScene& scene, const Loss& loss,
         bound.emplace_back(s.l22, s.reach * (1 + 1e-5), s.depth, 0.0);
     }
     SpecConstants constants = kernel_constants(scene.kernel, scene.footprint);
+    const std::uint32_t subgroup = add_block_constants(device, constants);
+    constants["THREADS"] = static_cast<std::int32_t>(subgroup);
     constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
     constants["DEPTH_SUM"] = constants["ALPHA_GRADIENT"] = scene.depth_sum ? 1 : 0;
-    const Pipeline gradient(device, "profile_gradient", for_several_passes(constants), false);
+    const Pipeline gradient(device, "profile_gradient", for_several_passes(constants), true,
+                            subgroup);
     const Pipeline add(device, "profile_sums", {}, false);
     gpu::FrameStatus status{};
     status.overflow = overflow;
-    const auto rows_count = static_cast<std::uint32_t>(4 * lists.tile_count());
+    const auto rows_count = static_cast<std::uint32_t>(lists.tile_count());
     const size_t pixels = size_t(scene.width) * scene.height;
     const GuardedBuffer ranges(device, "tile range", shuffled.ranges),
         order(device, "intersection from sorted", shuffled.order),
         splats(device, "splat from intersection", shuffled.splat_from_intersection),
         shapes(device, "shape", shape), lights(device, "light", light),
         bounds(device, "bound", bound), d_image(device, "d_image", loss.planes),
-        final_t(device, "final T", frame.transmittance), last(device, "last", frame.last),
+        final_t(device, "final T", frame.transmittance),
+        state(device, "state", frame.transmittance), last(device, "last", frame.last),
         rows(device, "rows", std::vector<float>(size_t{rows_count} * PROFILE_SUMS, NAN)),
-        state(device, "state", std::vector<float>(2 * (scene.segment > 0 ? pixels : 1), NAN)),
+        behind(device, "behind", std::vector<float>(scene.segment > 0 ? pixels : 1, NAN)),
         statuses(device, "status", std::vector{status}),
         sums(device, "sums", std::vector<float>(PROFILE_SUMS, 0.0f));
     std::uint32_t longest = 0;
@@ -96,17 +100,18 @@ std::vector<float> sums_on_device(const BlendScene& scene, const Loss& loss,
     Commands commands(device);
     commands.begin();
     for (int frame_number = 0; frame_number < 2; ++frame_number) {
+        commands.copy(final_t, state, pixels * 4);
         for (args.segment = args.segments; args.segment-- > 0;)
-            commands.dispatch(gradient, args,
-                              {ranges, order, splats, shapes, lights, bounds, d_image, final_t,
-                               last, rows, state},
-                              2 * static_cast<std::uint32_t>(lists.tiles_x),
-                              2 * static_cast<std::uint32_t>(lists.tiles_y));
+            commands.dispatch(
+                gradient, args,
+                {ranges, order, splats, shapes, lights, bounds, d_image, state, last, rows, behind},
+                static_cast<std::uint32_t>(lists.tiles_x),
+                static_cast<std::uint32_t>(lists.tiles_y));
         commands.dispatch(add, gpu::ProfileSumArgs{rows_count}, {rows, statuses, sums}, 1);
     }
     commands.submit_and_wait();
-    for (const GuardedBuffer* buffer :
-         {&ranges, &order, &splats, &d_image, &final_t, &last, &rows, &state, &statuses, &sums})
+    for (const GuardedBuffer* buffer : {&ranges, &order, &splats, &d_image, &final_t, &last, &rows,
+                                        &state, &behind, &statuses, &sums})
         EXPECT_TRUE(buffer->intact());
     return sums.read<float>();
 }

@@ -95,7 +95,7 @@ struct TrainOptions {
     // How often the profile of the kernel changes over the run, which starts from `kernel`; 0: it
     // stays. See engine/kernels/learned_profile.h.
     int learn_kernel = 0;
-    float kernel_lr = 0.2f;  // how far such a change moves what the profile is made of
+    float kernel_lr = 0.4f;  // how far such a change moves what the profile is made of
     // Whether the rate of the other bands, a twentieth of it, is multiplied by 30,000 / iterations,
     // at most 10: they come late in a run. docs/experiments/harmonics.md has what that brings.
     bool speed_up_sh_rest = true;
