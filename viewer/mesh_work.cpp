@@ -74,14 +74,14 @@ ShownMesh shown_mesh_of(TriangleMesh mesh, const fs::path& file, std::vector<std
                     "mesh.glb.");
     if (mesh.colour.empty())
         notes.emplace_back(
-            "It has no colours at its vertices, and textures are not shown: it is grey.");
+            "It has no colours at its vertices and no texture within its file: it is grey.");
     return {std::move(mesh), file, std::move(notes)};
 }
 
 ShownMesh read_shown_mesh(const fs::path& file, const MeshProgress& progress) {
     if (progress) progress("reading", 0);
     std::vector<std::string> notes;
-    TriangleMesh mesh = read_mesh(file, &notes);
+    TriangleMesh mesh = read_mesh(file, &notes, {.colours_of_textures = true});
     return shown_mesh_of(std::move(mesh), file, std::move(notes));
 }
 

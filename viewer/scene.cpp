@@ -65,7 +65,8 @@ Scene mesh_scene_of(std::span<const std::byte> bytes, const std::filesystem::pat
     const auto start = std::chrono::steady_clock::now();
     if (progress) progress(kReadShare, "decoding");
     std::vector<std::string> notes;
-    TriangleMesh mesh = parse_mesh(bytes, scene.file.string(), folder, &notes);
+    TriangleMesh mesh =
+        parse_mesh(bytes, scene.file.string(), folder, &notes, {.colours_of_textures = true});
     const bool holds_faces = mesh.face_count() > 0;
     if (progress) progress(kReadShare + kDecodeShare, "measuring");
     scene.model = points_as_splats(vertices_of(mesh));

@@ -37,18 +37,25 @@ EncodedSplats encode_mesh(const TriangleMesh& mesh, const std::string& where,
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const MeshTexture* texture = nullptr, const MeshFileOptions& options = {});
 
+struct MeshReadOptions {
+    /// Vertices without colours take those of the texture in a .glb or .gltf, at their places on
+    /// it.
+    bool colours_of_textures = false;
+};
+
 /// Reads a mesh, or points where the file has no faces. PLY and glTF are known by their content,
 /// OBJ by its ending. Polygons become fans of triangles. Colours of vertices and normals are kept,
-/// textures are not read. Positions are relative to an origin where float32 would cut them. notes:
-/// where not null, receives a sentence on what was left out. Throws Error naming file, place,
-/// reason and remedy.
-TriangleMesh read_mesh(const std::filesystem::path& path,
-                       std::vector<std::string>* notes = nullptr);
+/// textures are not, but for what options ask for. Positions are relative to an origin where
+/// float32 would cut them. notes: where not null, receives a sentence on what was left out. Throws
+/// Error naming file, place, reason and remedy.
+TriangleMesh read_mesh(const std::filesystem::path& path, std::vector<std::string>* notes = nullptr,
+                       const MeshReadOptions& options = {});
 
 /// As read_mesh. where: the file's name; folder: where files beside it are, empty: none can be
 /// read.
 TriangleMesh parse_mesh(std::span<const std::byte> file, const std::string& where,
                         const std::filesystem::path& folder = {},
-                        std::vector<std::string>* notes = nullptr);
+                        std::vector<std::string>* notes = nullptr,
+                        const MeshReadOptions& options = {});
 
 }  // namespace darb

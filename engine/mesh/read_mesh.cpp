@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "engine/core/json_text.h"
 #include "engine/core/parse_number.h"
 #include "engine/core/text.h"
+#include "engine/data/image_io.h"
 #include "engine/mesh/mesh_file.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/gltf.h"
@@ -338,8 +340,9 @@ class ObjReader {
 
 class GltfMeshReader {
   public:
-    GltfMeshReader(const gltf::Document& document, MeshBuilder& mesh)
-        : document_(document), mesh_(mesh) {}
+    GltfMeshReader(const gltf::Document& document, const MeshReadOptions& options,
+                   MeshBuilder& mesh)
+        : document_(document), options_(options), mesh_(mesh) {}
 
     void read() {
         constexpr const char* kKnown[] = {"KHR_mesh_quantization", "KHR_materials_unlit",
@@ -408,6 +411,8 @@ class GltfMeshReader {
 
     void add_colours(const json& primitive, std::size_t count) {
         const auto colour = attribute(primitive, "COLOR_0", 3);
+        if (!colour && options_.colours_of_textures)
+            return add_colours_of_texture(primitive, count);
         if (!colour || colour->count != count) return;
         for (std::size_t i = 0; i < count; ++i) {
             glm::u8vec3 srgb;
@@ -419,6 +424,56 @@ class GltfMeshReader {
                 srgb[c] = static_cast<std::uint8_t>(std::lround(255 * s));
             }
             mesh_.colour.push_back(srgb);
+        }
+    }
+
+    /// The picture of the primitive's base colour and the name of its places; null where it has
+    /// none in the file's own buffers.
+    const ImageU8* texture_of(const json& primitive, std::string& places) {
+        if (!primitive.contains("material")) return nullptr;
+        const json& material =
+            document_.json.at("materials").at(gltf::whole_number(primitive, "material"));
+        const json base = material.value("pbrMetallicRoughness", json::object())
+                              .value("baseColorTexture", json::object());
+        if (!base.contains("index")) return nullptr;
+        places = fmt::format("TEXCOORD_{}", gltf::whole_number(base, "texCoord", 0));
+        const json& texture = document_.json.at("textures").at(gltf::whole_number(base, "index"));
+        const std::size_t index = gltf::whole_number(texture, "source");
+        const json& image = document_.json.at("images").at(index);
+        if (!image.contains("bufferView")) return nullptr;
+        const auto known = images_.find(index);
+        if (known != images_.end()) return &known->second;
+        const json& view =
+            document_.json.at("bufferViews").at(gltf::whole_number(image, "bufferView"));
+        const std::vector<std::byte>& buffer =
+            document_.buffers.at(gltf::whole_number(view, "buffer"));
+        const std::size_t at = gltf::whole_number(view, "byteOffset", 0),
+                          bytes = gltf::whole_number(view, "byteLength");
+        if (at > buffer.size() || bytes > buffer.size() - at)
+            throw wrong("its picture does not lie within its buffer");
+        const Bytes file = std::span(buffer).subspan(at, bytes);
+        const std::string where = fmt::format("{}, image {}", document_.where, index);
+        const ImageInfo info = parse_image_info(file, where);
+        check_expansion(bytes, 4 * std::uint64_t(info.width) * std::uint64_t(info.height), where);
+        return &images_.emplace(index, decode_image(file, where, 1)).first->second;
+    }
+
+    void add_colours_of_texture(const json& primitive, std::size_t count) {
+        std::string places;
+        const ImageU8* const image = texture_of(primitive, places);
+        if (!image) return;
+        const auto place = attribute(primitive, places.c_str(), 2);
+        if (!place || place->count != count) return;
+        const auto pixel = [](double at, int size) {  // pages repeat beyond 0 and 1
+            const double share = std::isfinite(at) ? at - std::floor(at) : 0.0;
+            return std::min(static_cast<int>(share * size), size - 1);
+        };
+        for (std::size_t i = 0; i < count; ++i) {
+            const int x = pixel(place->value(i, 0), image->width),
+                      y = pixel(place->value(i, 1), image->height);
+            glm::u8vec3 colour;
+            for (int c = 0; c < 3; ++c) colour[c] = image->at(x, y, image->channels < 3 ? 0 : c);
+            mesh_.colour.push_back(colour);
         }
     }
 
@@ -451,19 +506,21 @@ class GltfMeshReader {
     }
 
     const gltf::Document& document_;
+    const MeshReadOptions& options_;
     MeshBuilder& mesh_;
+    std::map<std::size_t, ImageU8> images_;
     int primitive_ = -1;
     std::size_t lines_ = 0;
 };
 
 void read_gltf_mesh(Bytes file, const std::string& where, const fs::path& folder,
-                    MeshBuilder& mesh) try {
+                    const MeshReadOptions& options, MeshBuilder& mesh) try {
     SplatSource source;
     source.bytes = file;
     source.where = where;
     source.folder = folder;
     const gltf::Document document = gltf::open_document(source);
-    GltfMeshReader(document, mesh).read();
+    GltfMeshReader(document, options, mesh).read();
 } catch (const json::exception& error) {
     throw Error(where, json_reason(error), kCopyAgain);
 } catch (const std::out_of_range& error) {
@@ -474,7 +531,7 @@ void read_gltf_mesh(Bytes file, const std::string& where, const fs::path& folder
 }  // namespace
 
 TriangleMesh parse_mesh(Bytes file, const std::string& where, const fs::path& folder,
-                        std::vector<std::string>* notes) {
+                        std::vector<std::string>* notes, const MeshReadOptions& options) {
     MeshBuilder mesh(where, notes);
     const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
     const fs::path name = where;
@@ -482,7 +539,7 @@ TriangleMesh parse_mesh(Bytes file, const std::string& where, const fs::path& fo
         read_ply_mesh(file, where, mesh);
     } else if (text.starts_with("glTF") || has_extension(name, ".gltf") ||
                has_extension(name, ".glb")) {
-        read_gltf_mesh(file, where, folder, mesh);
+        read_gltf_mesh(file, where, folder, options, mesh);
     } else if (has_extension(name, ".obj")) {
         ObjReader(text, where, mesh).read();
     } else {
@@ -492,8 +549,9 @@ TriangleMesh parse_mesh(Bytes file, const std::string& where, const fs::path& fo
     return mesh.finish();
 }
 
-TriangleMesh read_mesh(const fs::path& path, std::vector<std::string>* notes) {
-    return parse_mesh(read_file(path), path.string(), path.parent_path(), notes);
+TriangleMesh read_mesh(const fs::path& path, std::vector<std::string>* notes,
+                       const MeshReadOptions& options) {
+    return parse_mesh(read_file(path), path.string(), path.parent_path(), notes, options);
 }
 
 }  // namespace darb

@@ -60,6 +60,48 @@ TEST_F(MeshFiles, Every_format_opens_as_a_mesh_with_its_vertices_as_points) {
     }
 }
 
+TEST_F(MeshFiles, A_texture_within_the_file_colours_the_vertices) {
+    TriangleMesh square;
+    square.position = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+    square.face = {{0, 1, 2}, {0, 2, 3}};
+    MeshTexture texture;
+    const glm::vec2 at[] = {{0.1f, 0.1f}, {0.9f, 0.1f}, {0.9f, 0.9f}, {0.1f, 0.9f}};
+    texture.uv = {{at[0], at[1], at[2]}, {at[0], at[2], at[3]}};
+    texture.page = {0, 0};
+    texture.image = {ImageU8(2, 2, 3)};
+    const glm::u8vec3 colours[] = {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {9, 90, 200}};
+    const int x[] = {0, 1, 1, 0}, y[] = {0, 0, 1, 1};
+    for (int i = 0; i < 4; ++i)
+        for (int c = 0; c < 3; ++c) texture.image[0].at(x[i], y[i], c) = colours[i][c];
+    write_mesh(folder_ / "square.glb", square, &texture);
+    const ShownMesh shown = read_shown_mesh(folder_ / "square.glb");
+    ASSERT_EQ(shown.mesh.colour.size(), shown.mesh.vertex_count());
+    EXPECT_TRUE(shown.notes.empty());
+    for (std::size_t v = 0; v < shown.mesh.vertex_count(); ++v)
+        for (int i = 0; i < 4; ++i)
+            if (glm::distance(shown.mesh.position[v], square.position[std::size_t(i)]) < 1e-6f) {
+                EXPECT_EQ(shown.mesh.colour[v], colours[i]) << i;
+            }
+    EXPECT_TRUE(read_mesh(folder_ / "square.glb").colour.empty()) << "where nobody asks for them";
+    write_mesh(folder_ / "square.gltf", square, &texture);
+    EXPECT_EQ(read_shown_mesh(folder_ / "square.gltf").notes.size(), 1u) << "a file beside it";
+}
+
+TEST_F(MeshFiles, A_broken_texture_is_an_error_that_names_it) {
+    const TriangleMesh box = test::box_mesh({0, 0, 0}, {1, 1, 1});
+    MeshTexture texture;
+    texture.uv.resize(box.face_count());
+    texture.page.resize(box.face_count());
+    texture.image = {ImageU8(4, 4, 3)};
+    std::vector<std::byte> file = encode_mesh(box, "box.glb", &texture).file;
+    const std::string text(reinterpret_cast<const char*>(file.data()), file.size());
+    file[text.find("PNG")] = std::byte{0};
+    const std::string said =
+        error_of([&] { parse_mesh(file, "box.glb", {}, nullptr, {.colours_of_textures = true}); });
+    EXPECT_NE(said.find("box.glb, image 0"), std::string::npos) << said;
+    EXPECT_EQ(parse_mesh(file, "box.glb").face_count(), 12u) << "where nobody asks for it";
+}
+
 TEST_F(MeshFiles, What_is_no_mesh_says_so) {
     SplatModel splats;
     splats.resize(3);
