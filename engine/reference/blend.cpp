@@ -387,8 +387,9 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
     return tile_backward<T>(lists, tile, list, kernel, settings, d_image,
                             [&](const Blended<T>& b, T d_alpha, const PixelGradient<T>& d_pixel) {
                                 ProjectedGradient<T>& to = intersections[b.entry];
-                                to.d_depth += (d_pixel.depth + 2 * d_pixel.square * list[b.entry].depth) *
-                                              (b.before * b.sample.alpha);
+                                to.d_depth +=
+                                    (d_pixel.depth + 2 * d_pixel.square * list[b.entry].depth) *
+                                    (b.before * b.sample.alpha);
                                 to.d_colour += d_pixel.colour * (b.before * b.sample.alpha);
                                 add_sample_gradient(list[b.entry], b.sample, d_alpha, kernel, to);
                             });

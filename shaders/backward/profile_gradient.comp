@@ -63,7 +63,7 @@ void add_splat(inout Pixels px, uint k, vec2 to_mean, vec4 shape, float l22, vec
     const float alpha = mix(0.0, min(raw, ALPHA_MAX), counts);
     const float before = px.transmittance[k] / (1.0 - alpha);
     float ahead = dot(light.rgb, px.d_colour[k]) - px.behind[k];
-    if (DEPTH_SUM == 1) ahead += z * d_depth[k];
+    if (DEPTH_SUM == 1) ahead += depth_by_weight(z, d_depth[k]);
     const float g = mix(0.0, light.w * before * ahead, counts && raw < ALPHA_MAX);
     px.behind[k] += alpha * ahead;
     px.transmittance[k] = before;
