@@ -155,8 +155,8 @@ CameraBlur blur_of(const RenderFlags& flags, const SplatModel& model, const Came
     CameraBlur blur{.aperture = flags.blur.aperture, .samples = flags.blur.samples};
     if (!(blur.aperture > 0)) return blur;
     if (camera.lens.active)
-        throw Error(where, "its lens is kept, and --aperture bends straight pictures only",
-                    "Leave --lens out.");
+        throw Error(where, "its lens is kept, and --aperture works on straight pictures only",
+                    "Use --lens undistort.");
     const std::optional<double> focus =
         flags.blur.focus ? flags.blur.focus : seen_depth(model, camera);
     if (!focus)
@@ -562,7 +562,7 @@ CameraPath turn_around(const RenderFlags& render, const PixelSize& size, const S
 
 void add_blur_flags(CLI::App& c, BlurFlags& flags) {
     c.add_option("--aperture", flags.aperture,
-                 "depth of field: the radius of the lens, world units; 0: everything is sharp")
+                 "depth of field: the radius of the aperture, world units; 0: everything is sharp")
         ->capture_default_str()
         ->check(zero_or_more());
     c.add_option("--focus", flags.focus, "the distance that is sharp, world units")
@@ -573,7 +573,7 @@ void add_blur_flags(CLI::App& c, BlurFlags& flags) {
                  "180 is usual")
         ->capture_default_str()
         ->check(CLI::Range(0.0, 360.0));
-    c.add_option("--samples", flags.samples, "pictures that a blurred one is the mean of")
+    c.add_option("--samples", flags.samples, "how many sharp pictures a blurred one is the mean of")
         ->capture_default_str()
         ->check(CLI::Range(2, 4096));
 }
@@ -584,7 +584,7 @@ void add_orthophoto_flags(CLI::App& c, OrthophotoFlags& flags) {
         ->check(CLI::IsMember({"above", "x", "-x", "y", "-y", "z", "-z"}))
         ->capture_default_str();
     c.add_option("--pixel", flags.pixel, "side of an orthophoto's pixel, world units")
-        ->default_str("its longer side is 2048 px")
+        ->default_str("so large that the longer side has 2048 px")
         ->check(above_zero());
 }
 
@@ -595,8 +595,10 @@ void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
                      "without it and --cameras the camera goes once around what the scene's "
                      "cameras look at. Both also make a video if ffmpeg is installed");
     path->excludes(cameras);
-    c.add_option("--size", flags.size,
-                 "size of the frames of a path, a turn or another --projection, WIDTHxHEIGHT px")
+    c.add_option(
+         "--size", flags.size,
+         "size of the frames of a path or a turn, of panoramas, or of the faces of a cubemap, "
+         "WIDTHxHEIGHT px")
         ->default_str("what nerfstudio's path says, else 1280x720");
     c.add_option("--fps", flags.fps, "frames a second of a path or a turn")
         ->check(CLI::Range(1, 240))
@@ -608,8 +610,8 @@ void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
         ->excludes(cameras)
         ->excludes(path);
     c.add_option("--up", flags.up,
-                 "up axis of the turn: x, -x, y, -y, z or -z (default: as the cameras were held, "
-                 "else what the file says, else a guess)")
+                 "up axis of the turn or of an orthophoto: x, -x, y, -y, z or -z (default: as the "
+                 "cameras were held, else what the file says, else a guess)")
         ->excludes(cameras)
         ->excludes(path);
     c.add_option("--around", flags.around,
