@@ -539,6 +539,13 @@ bool Edit::unsaved() const {
 
 SplatModel Edit::apply(const SplatModel& model) const {
     SplatModel out = model;
+    if (out.place.known() && out.size() > 0) {  // the middle of the scene stays where it is
+        glm::dvec3 middle(0.0);
+        for (std::size_t i = 0; i < out.size(); ++i)
+            middle += position_of(out, i) / static_cast<double>(out.size());
+        out.place.offset += (out.metres_per_unit - facts_.metres_per_unit) *
+                            (out.place.rotation * middle);
+    }
     out.metres_per_unit = facts_.metres_per_unit;
     keep_splats([&](std::size_t i) { return removed_[i] == 0; }, out);
     return out;

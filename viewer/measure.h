@@ -36,7 +36,7 @@ struct MeasuredLengths {
     std::optional<double> area;       // of a closed polygon
     std::optional<double> off_plane;  // the largest distance of its corners from its plane
 };
-/// up: a unit vector. The area is that of the polygon's outline on the plane that fits it best.
+/// up: a unit vector. The area is that of the polygon, projected onto the plane that fits it best.
 MeasuredLengths measured_lengths(const Measurement& measurement, const glm::dvec3& up);
 
 /// The unit vector at right angles to the polygon of the points, on the side of `up`; nothing where

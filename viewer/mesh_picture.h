@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// MeshPicture: a triangle mesh on the device and pictures of it, by compute passes: the faces leave
-// the least depth of each pixel, then who has it, then its colour. Frames under way take turns with
-// its buffers, in the order of the queue.
+// MeshPicture: a triangle mesh on the device and pictures of it, by compute passes: they find the
+// least depth of each pixel, then the face that has it, then its colour. Frames under way take
+// turns with its buffers, in the order of the queue.
 #pragma once
 
 #include <cstdint>
@@ -50,7 +50,7 @@ class MeshPicture {
 /// What Forward::record_blend does, with a mesh among the splats.
 class MeshBlend {
   public:
-    /// options: those of the frames, which are stored as float32 and sorted by the splats' middles.
+    /// options: those of the frames, which are stored as float32 and sorted by the splats' centres.
     MeshBlend(Device& device, const ForwardOptions& options)
         : device_(&device), options_(options) {}
     /// After Forward::record_intersections of a frame, and MeshPicture::record of the same camera.

@@ -220,7 +220,14 @@ void find_place(Dataset& dataset) {
             positions.push_back(*position);
         }
     }
-    if (positions.size() < kFewestPositions) return;
+    if (positions.empty()) return;
+    if (positions.size() < kFewestPositions) {
+        dataset.notes.push_back(
+            fmt::format("The GPS positions of {} photos are too few to tell the scene's scale; {} "
+                        "with altitudes are needed.",
+                        positions.size(), kFewestPositions));
+        return;
+    }
     const std::optional<FoundPlace> found = place_by_positions(centres, positions);
     if (!found) {
         dataset.notes.push_back(

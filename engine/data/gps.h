@@ -34,14 +34,14 @@ struct FoundPlace {
 };
 
 /// The similarity that takes camera centres to where they were, robust against single positions
-/// that are wrong. Both have the same size. Nothing for fewer than 4, or where all lie on one
-/// line, about which the scene could turn.
+/// that are wrong. Nothing for fewer than 4, or where all lie on one line, about which the scene
+/// could turn. Throws Error where there are not as many positions as centres.
 std::optional<FoundPlace> place_by_positions(std::span<const glm::dvec3> centres,
                                              std::span<const GeoPosition> positions);
 
-/// Reads the positions of the photos, and sets Dataset::metres_per_unit and Dataset::place where
-/// they determine these, with a note. A note says as well where they are too coarse: where `off` is
-/// more than a fifth of `reach`.
+/// Reads the positions of the photos, and sets Dataset::place and, where depths have not set it,
+/// Dataset::metres_per_unit, with a note. A note also says where positions do not determine these,
+/// or are too coarse: where `off` is more than a fifth of `reach`. Fewer than 4 change nothing.
 void find_place(Dataset& dataset);
 
 }  // namespace darb

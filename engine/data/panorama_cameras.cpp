@@ -138,7 +138,7 @@ class PanoramaCameras {
         if (sources_.size() != names.size() * kPanoramaViews)
             throw Error(run.photos.string(),
                         "has panoramas whose names differ only in their extensions",
-                        "Rename one of each two.");
+                        "Rename one of each pair.");
     }
     fs::path data_set();
 

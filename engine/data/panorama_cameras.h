@@ -23,7 +23,7 @@ namespace darb {
 inline constexpr std::size_t kPanoramaViews = 6;
 const std::array<CubeFace, kPanoramaViews>& panorama_views();
 
-/// A world to camera pose.
+/// A pose that takes world to camera coordinates.
 struct PanoramaPose {
     glm::dmat3 rotation{1.0};
     glm::dvec3 translation{0.0};
@@ -35,8 +35,8 @@ struct PanoramaPose {
 /// views: what each view says of the panorama's pose. Nothing where there are none.
 std::optional<PanoramaPose> agreed_pose(std::span<const PanoramaPose> views, double reach);
 
-/// Which panoramas are compared with which, first < second: all with all, or with `neighbours` the
-/// next ones and, twice as far each time, ones farther on.
+/// Which panoramas are compared with which, first < second: all with all, or with `neighbours` each
+/// with the next four and with those 8, 16, 32 and so on farther.
 std::vector<std::pair<std::size_t, std::size_t>> panorama_pairs(std::size_t count, bool neighbours);
 
 /// Writes a COLMAP model, as text, of panoramas without cameras: run.photos are these, and names

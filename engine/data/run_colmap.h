@@ -117,10 +117,10 @@ std::vector<ColmapCommand> colmap_commands(const ColmapRun& run, const ColmapPat
 /// Runs the commands. Where less than a share kEnoughPhotos of the photos get a camera, it tries
 /// again with the next effort, and keeps the model that holds the most photos. Returns the data
 /// set's folder (workspace/dense, with images and sparse), or with run.pinhole the model's; the
-/// model is workspace/sparse, and
-/// everything that COLMAP printed is in workspace/colmap.log. What an interrupted run left is used
-/// again where the options are equal. Throws Error with the commands in its hint where COLMAP is
-/// not installed, or with the last printed lines where a command fails; and ColmapStopped.
+/// model is workspace/sparse, and everything that COLMAP printed is in workspace/colmap.log. What
+/// an interrupted run left is used again where the options are equal. Throws Error with the
+/// commands in its hint where COLMAP is not installed, or with the last printed lines where a
+/// command fails; and ColmapStopped.
 std::filesystem::path run_colmap(const ColmapRun& run, const ColmapReports& reports);
 
 /// The effort that made workspace/sparse; usual where it is not known.

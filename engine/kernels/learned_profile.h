@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A kernel whose profile training changes, one for the whole scene:
 //   w(q) = sum_j p_j F_j(u), u = 1 - q/R^2, F_j(u) = sum_{k >= j} B_{k,n}(u), j = 1..n,
-// with Bernstein's polynomials B_{k,n} of degree n = 6 and weights p > 0 of sum 1, the softmax of
+// with the Bernstein polynomials B_{k,n} of degree n = 6 and weights p > 0 of sum 1, the softmax of
 // what is learned. Each F_j rises from 0 at the edge to 1 at the centre, and so does every w: the
 // parameters cannot leave the set of kernels. R^2 follows from p so that psi, the second moment in
 // space, stays that of the kernel at the start. Formulas: docs/math.md, A profile that is learned.

@@ -12,7 +12,7 @@
 namespace darb {
 
 struct CameraBlur {
-    double aperture = 0;  // radius of the lens, world units; 0: everything is sharp
+    double aperture = 0;  // its radius, world units; 0: everything is sharp
     double focus = 0;     // distance along the optical axis that is sharp, world units
     double shutter = 0;   // seconds that the shutter is open; 0: nothing moves
     int samples = 32;     // pictures that are averaged
@@ -27,8 +27,8 @@ Camera through_lens(const Camera& camera, const CameraBlur& blur, int i);
 /// the time that the shutter is open.
 double shutter_time(const CameraBlur& blur, int i);
 
-/// The mean of pictures as a sensor takes it: of their light, and not of their stored values, which
-/// are encoded by sRGB.
+/// The mean of pictures as a sensor takes it: in linear light, not of the stored values, which are
+/// encoded by sRGB.
 class MeanPicture {
   public:
     /// All pictures have the same shape. Throws Error where one differs.

@@ -52,13 +52,14 @@ std::vector<OrthophotoTile> tiles_of(const Orthophoto& photo);
 using RenderTile = std::function<ImageU8(const OrthophotoTile&)>;
 ImageU8 draw_orthophoto(const Orthophoto& photo, const RenderTile& render);
 
-/// Where a world position p is on a map: scale * rotation * p + offset. As it is, the world is.
+/// Where a world position p is on a map: scale * rotation * p + offset. By default the map is the
+/// world itself.
 struct MapFrame {
     double scale = 1;
     glm::dmat3 rotation{1.0};
     glm::dvec3 offset{0.0};
 };
-/// Metres to the east, north and up of the scene's anchor on earth, which must be known.
+/// Metres east, north and up of the scene's anchor on earth, which must be known.
 MapFrame map_of(const SplatModel& model);
 
 /// The six lines of an ESRI world file (.pgw), which says where on a map the pixels are, where

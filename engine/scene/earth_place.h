@@ -9,8 +9,8 @@
 
 namespace darb {
 
-/// A world position p is at rotation * p * (metres a unit) + offset, in metres to the east, to the
-/// north and up of the anchor.
+/// A world position p is at rotation * p * (metres per unit) + offset, in metres east, north and up
+/// of the anchor.
 struct EarthPlace {
     double latitude = 0, longitude = 0, altitude = 0;  // of the anchor: degrees (WGS 84), metres
     glm::dmat3 rotation{0.0};  // of the world's axes to east, north and up; 0: not known
@@ -29,7 +29,7 @@ std::string place_text(const EarthPlace& place);
 /// Reads it back; nothing where it is something else.
 std::optional<EarthPlace> place_from_text(std::string_view text);
 
-/// For people: "47.1234 N, 8.5432 E, 412 m; north is 0.98 -0.17 0.01".
+/// For people: "47.12340 N, 8.54320 E, 412 m; north is 0.985 -0.174 0.000, up 0.000 0.000 1.000".
 std::string place_summary(const EarthPlace& place);
 
 }  // namespace darb

@@ -50,10 +50,10 @@ nlohmann::json dataset_info(const std::filesystem::path& path, const DatasetOpti
 /// Reads any splat file. Keys: path, format, version (null where the format has none), details,
 /// bytes, splats, dropped, notes (of the reader), kernel, footprint, render_mode, sh_degree,
 /// origin; bounds and inner_bounds (1st to 99th percentile by axis) {low, high}, world; scale (the
-/// largest standard deviation of a splat, world), metres_per_unit where it is known, opacity and,
-/// for a kernel with shapes, exponent (as drawn) {p1, p10, p50, p90, p99}; zero_rotations, huge,
-/// needles, saturated, invisible (counts); warnings (sentences). Throws Error for other files.
-/// O(N).
+/// largest standard deviation of a splat, world), opacity and, for a kernel with shapes, exponent
+/// (as drawn) {p1, p10, p50, p90, p99}; metres_per_unit and place (on earth, a text) where they are
+/// known; zero_rotations, huge, needles, saturated, invisible (counts); warnings (sentences).
+/// Throws Error for other files. O(N).
 nlohmann::json scene_info(const std::filesystem::path& path, const StoredUnits& units = {});
 
 namespace {

@@ -155,8 +155,8 @@ CameraBlur blur_of(const RenderFlags& flags, const SplatModel& model, const Came
     CameraBlur blur{.aperture = flags.blur.aperture, .samples = flags.blur.samples};
     if (!(blur.aperture > 0)) return blur;
     if (camera.lens.active)
-        throw Error(where, "its lens is kept, and --aperture bends straight pictures only",
-                    "Leave --lens out.");
+        throw Error(where, "its lens is kept, and --aperture works on straight pictures only",
+                    "Use --lens undistort.");
     const std::optional<double> focus =
         flags.blur.focus ? flags.blur.focus : seen_depth(model, camera);
     if (!focus)
@@ -363,7 +363,8 @@ int render(RenderFlags flags) {
 void add_render(CLI::App& app, Action& action) {
     auto flags = std::make_shared<RenderFlags>();
     CLI::App* command = app.add_subcommand(
-        "render", "Render a scene to PNG files: from cameras, along a path, or once around it");
+        "render", "Render a scene to PNG files: from cameras, along a path, once around it, or without "
+        "perspective");
     command->add_option("scene", flags->scene, "splat file, or the output folder of darb train")
         ->required();
     CLI::Option* const cameras =
@@ -562,7 +563,7 @@ CameraPath turn_around(const RenderFlags& render, const PixelSize& size, const S
 
 void add_blur_flags(CLI::App& c, BlurFlags& flags) {
     c.add_option("--aperture", flags.aperture,
-                 "depth of field: the radius of the lens, world units; 0: everything is sharp")
+                 "depth of field: the radius of the aperture, world units; 0: everything is sharp")
         ->capture_default_str()
         ->check(zero_or_more());
     c.add_option("--focus", flags.focus, "the distance that is sharp, world units")
@@ -573,7 +574,7 @@ void add_blur_flags(CLI::App& c, BlurFlags& flags) {
                  "180 is usual")
         ->capture_default_str()
         ->check(CLI::Range(0.0, 360.0));
-    c.add_option("--samples", flags.samples, "pictures that a blurred one is the mean of")
+    c.add_option("--samples", flags.samples, "how many sharp pictures a blurred one is the mean of")
         ->capture_default_str()
         ->check(CLI::Range(2, 4096));
 }
@@ -584,7 +585,7 @@ void add_orthophoto_flags(CLI::App& c, OrthophotoFlags& flags) {
         ->check(CLI::IsMember({"above", "x", "-x", "y", "-y", "z", "-z"}))
         ->capture_default_str();
     c.add_option("--pixel", flags.pixel, "side of an orthophoto's pixel, world units")
-        ->default_str("its longer side is 2048 px")
+        ->default_str("so large that the longer side has 2048 px")
         ->check(above_zero());
 }
 
@@ -595,8 +596,10 @@ void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
                      "without it and --cameras the camera goes once around what the scene's "
                      "cameras look at. Both also make a video if ffmpeg is installed");
     path->excludes(cameras);
-    c.add_option("--size", flags.size,
-                 "size of the frames of a path, a turn or another --projection, WIDTHxHEIGHT px")
+    c.add_option(
+         "--size", flags.size,
+         "size of the frames of a path or a turn, of panoramas, or of the faces of a cubemap, "
+         "WIDTHxHEIGHT px")
         ->default_str("what nerfstudio's path says, else 1280x720");
     c.add_option("--fps", flags.fps, "frames a second of a path or a turn")
         ->check(CLI::Range(1, 240))
@@ -608,8 +611,8 @@ void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
         ->excludes(cameras)
         ->excludes(path);
     c.add_option("--up", flags.up,
-                 "up axis of the turn: x, -x, y, -y, z or -z (default: as the cameras were held, "
-                 "else what the file says, else a guess)")
+                 "up axis of the turn or of an orthophoto: x, -x, y, -y, z or -z (default: as the "
+                 "cameras were held, else what the file says, else a guess)")
         ->excludes(cameras)
         ->excludes(path);
     c.add_option("--around", flags.around,
@@ -628,7 +631,7 @@ Camera first_camera(const CameraPath& path, const PixelSize& size) {
 }
 
 // Where the orthophoto lies, for programs: in the scene's world.
-nlohmann::json orthophoto_json(const Orthophoto& photo, const SplatModel& model) {
+nlohmann::json orthophoto_json(const Orthophoto& photo, const SplatModel& model, bool on_earth) {
     const glm::dmat3 rows = glm::transpose(photo.axes);
     const auto list = [](const glm::dvec3& v) { return nlohmann::json{v.x, v.y, v.z}; };
     nlohmann::json json{{"width", photo.width},           {"height", photo.height},
@@ -636,7 +639,7 @@ nlohmann::json orthophoto_json(const Orthophoto& photo, const SplatModel& model)
                         {"down", list(rows[1])},          {"forward", list(rows[2])},
                         {"top_left", list(photo.corner)}, {"depth", photo.depth}};
     if (model.metres_per_unit > 0) json["metres_per_unit"] = model.metres_per_unit;
-    if (model.place.known())
+    if (on_earth)
         json["anchor"] = {{"latitude", model.place.latitude},
                           {"longitude", model.place.longitude},
                           {"altitude", model.place.altitude}};
@@ -687,7 +690,7 @@ int render_orthophoto(const RenderFlags& flags, const Accuracy& accuracy,
                   plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
                   return to_8bit(image);
               }));
-    write_file_atomic(outputs[1], orthophoto_json(photo, model).dump(1) + "\n");
+    write_file_atomic(outputs[1], orthophoto_json(photo, model, on_earth).dump(1) + "\n");
     if (map) write_file_atomic(outputs[2], *map);
     written.wrote(outputs);
     std::FILE* const out = flags.quiet ? nullptr : stdout;

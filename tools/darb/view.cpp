@@ -301,11 +301,12 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
          "a mesh to show with the scene, such as darb mesh writes: .ply, .obj, .glb or .gltf")
         ->needs(c.get_option("scene"));
     c.add_option("--mesh-show", flags.mesh_show,
-                 "alone, both where each hides what is behind it, or beside the splats")
+                 "alone: the mesh; both: mesh and splats in one picture; beside: in two strips")
         ->check(CLI::IsMember({"alone", "both", "beside"}))
         ->needs(c.get_option("--mesh"))
         ->capture_default_str();
-    c.add_option("--mesh-as", flags.mesh_look, "how the mesh is drawn; edges: its shape with those")
+    c.add_option("--mesh-as", flags.mesh_look,
+                 "colours: those of the vertices; shape: grey; edges: grey with the faces' edges")
         ->check(CLI::IsMember({"colours", "shape", "edges"}))
         ->needs(c.get_option("--mesh"))
         ->capture_default_str();

@@ -197,7 +197,7 @@ std::vector<std::string> unused_options(const TrainRequest& r) {
         has_builtin_evaluation(kernel) && r.train.learn_kernel > 0)
         notes.push_back("--evaluation builtin is not used: a learned kernel has polynomials only");
     if (was_given(r, "--kernel-lr") && r.train.learn_kernel == 0)
-        notes.push_back("--kernel-lr is not used: --learn-kernel gives the changes it is for");
+        notes.push_back("--kernel-lr is not used: it is for --learn-kernel");
     if (r.train.shape_lr && !kernel_has_shape(kernel))
         notes.push_back("--shape-lr is not used: splats have shapes of their own with --kernel " +
                         shaped_kernel_names());

@@ -206,9 +206,9 @@ void photo_rows(Rows& rows) {
          .place = [](Request& r) -> RequestPlace { return &r.sequential; }});
     rows.push_back({.row = {.flags = "--panoramas",
                             .group = option_group::kPhotos,
-                            .help = "photos or a video without cameras: whether they show all "
-                                    "directions (equirectangular), of a 360-degree camera; auto: "
-                                    "as the files say",
+                            .help = "photos or a video without cameras: whether they are "
+                                    "equirectangular panoramas of a 360-degree camera; auto: as "
+                                    "their metadata says",
                             .usual = "auto"},
                     .words = "auto,on,off",
                     .section = "data",

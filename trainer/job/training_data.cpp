@@ -198,7 +198,7 @@ bool are_panoramas(const PhotoList& list, const TrainRequest& request, const fs:
     if (list.marked_panoramas == count) return true;
     if (list.marked_panoramas > 0)
         throw Error(photos.string(),
-                    fmt::format("{} of {} photos are panoramas, and COLMAP takes either kind alone",
+                    fmt::format("{} of {} photos are panoramas, and COLMAP needs either kind alone",
                                 list.marked_panoramas, count),
                     "Put them into two folders, or say --panoramas on or off.");
     if (list.twice_as_wide == count)

@@ -295,15 +295,16 @@ const OptionRow kRows[] = {
      .setting = "/learn_kernel",
      .member = &Opt::learn_kernel,
      .group = option_group::kScene,
-     .help = "learn the kernel's profile beside the splats, from the one that --kernel names, in "
-             "this many changes over the run, such as 10; 0: it stays",
+     .help = "learn the kernel's profile together with the splats, starting from that of --kernel, "
+             "in this many changes over the run, such as 10; 0: it stays as it is",
      .most = 500,
      .stands = learns_kernel},
     {.flags = "--kernel-lr",
      .setting = "/kernel_lr",
      .member = &Opt::kernel_lr,
      .group = option_group::kRates,
-     .help = "how far a change of --learn-kernel moves the logarithms of the profile's weights",
+     .help = "step size of --learn-kernel: how far one change moves the logarithms of the "
+             "profile's weights",
      .least = kAboveZero,
      .most = 10,
      .stands = learns_kernel},

@@ -313,10 +313,10 @@ void Run::begin() {
         set_aside(run_.output);
         log_.begin();
         if (const TrainOptions& o = schedule_.options; o.learn_kernel > 0)
-            progress_.note(
-                fmt::format("the kernel's profile is learned; the one that it starts from is off "
-                            "{} by {:.4f} at most",
-                            kernel_name(o.kernel), LearnedProfile(o.kernel).distance_from_start()));
+            progress_.note(fmt::format(
+                "the kernel's profile is learned; where it starts, it differs from {} by "
+                "{:.4f} at most",
+                kernel_name(o.kernel), LearnedProfile(o.kernel).distance_from_start()));
         if (run_.write_start) run_.write_start(run_.output / "dense_start");
     }
     write_cameras();
@@ -549,7 +549,7 @@ void Run::report_kernel() {
     if (schedule_.options.learn_kernel == 0) return;
     const int kernel = trainer_.kernel();
     progress_.note(fmt::format(
-        "the kernel became {}, of support {:.3g}: darb psi --kernel-file {} shows it",
+        "the learned kernel is {}, with support {:.3g}: darb psi --kernel-file {} shows it",
         kernel_name(kernel), kernel_support(kernel), (run_.output / "kernel.json").string()));
 }
 

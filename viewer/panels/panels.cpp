@@ -78,10 +78,10 @@ void leaving_window(Session& s, float width, float height) {
     }
     const bool quit = s.leaving->quit;
     if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.ask(request::SaveAndLeave{});
-    tip("Save as said above first");
+    tip("Save to the files above first");
     ImGui::SameLine();
     if (ImGui::Button(quit ? "Quit" : "Open")) s.ask(request::Leave{});
-    tip("It is lost");
+    tip("What is not saved is lost");
     ImGui::SameLine();
     if (ImGui::Button("Stay")) s.ask(request::Stay{});
     tip("Esc");

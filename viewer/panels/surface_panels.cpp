@@ -24,9 +24,8 @@ void how_shown(Session& s) {
     int show = static_cast<int>(d.mesh), look = static_cast<int>(d.mesh_look);
     if (ImGui::Combo("show##mesh", &show, "splats\0mesh\0both\0side by side\0"))
         d.mesh = static_cast<MeshShow>(show);
-    tip("The splats, the mesh, both where each hides what is behind it, or both in strips whose "
-        "line "
-        "can be dragged; only while the picture is shown");
+    tip("The splats, the mesh, both in one picture, where each hides what is behind it, or both in "
+        "strips whose line can be dragged; only while the picture is shown");
     if (ImGui::Combo("mesh as", &look, "colours\0shape\0shape with edges\0"))
         d.mesh_look = static_cast<MeshLook>(look);
     tip("The colours of its vertices, or its shape in grey, with or without the edges of the "
@@ -35,7 +34,7 @@ void how_shown(Session& s) {
     float percent = 100 * d.mesh_nearer;
     if (ImGui::SliderFloat("bring forward", &percent, 0, 10, "%.1f %% of the depth", kLogarithmic))
         d.mesh_nearer = percent / 100;
-    tip("How much nearer than it is the mesh counts; splats whose middle is behind it are hidden");
+    tip("How much nearer than it is the mesh counts; splats whose centre is behind it are hidden");
 }
 
 void make_one(Session& s) {
@@ -46,10 +45,9 @@ void make_one(Session& s) {
     ImGui::DragFloat("voxel", &w.voxel, speed, 0, 1e6f, w.voxel > 0 ? "%.4g units" : "automatic",
                      kClamped);
     tip("Side of a voxel, in units of the scene; what is smaller than two is lost. 0: by the size "
-        "of "
-        "the pixels");
+        "of the pixels");
     ImGui::InputInt("faces", &w.faces, 0);
-    tip("Simplify to so many; 0 keeps all");
+    tip("Simplify the mesh to so many faces; 0 keeps all");
     w.faces = std::max(w.faces, 0);
     ImGui::Checkbox("thin things", &w.thin);
     tip("Keep what is as thin as a voxel; this takes longer");
@@ -117,7 +115,7 @@ void lengths_table(Session& s, const MeasuredLengths& lengths, double unit) {
     tip("Of all sides together");
     if (lengths.area) {
         ImGui::Text("area: %s", length_text(*lengths.area, unit, 2).c_str());
-        tip("Of the outline on the plane that fits it best");
+        tip("Of the outline, projected onto the plane that fits it best");
         if (lengths.sides.size() > 3)
             ImGui::Text("flat within %s", length_text(*lengths.off_plane, unit).c_str());
         return;
@@ -136,7 +134,7 @@ void scale_row(Session& s, const MeasuredLengths& lengths) {
     ImGui::SameLine();
     if (ImGui::Button("Set scale"))
         s.attempt([&] { set_known_length(t.known_side, t.known_metres, s); });
-    tip("From this length follow all others; the scale is saved with the scene");
+    tip("All other lengths follow from this one; the scale is saved with the scene");
     if (lengths.sides.size() < 2) return;
     ImGui::SameLine();
     if (ImGui::Button("Set ground")) s.attempt([&] { set_ground(s); });
@@ -152,8 +150,7 @@ void measure_panel(Session& s) {
     if (ImGui::Checkbox("click points (9)", &on))
         choose_tool(on ? Tool::measure : Tool::navigate, s);
     tip("A click picks a point of the surface, a drag of a point moves it, a click on the first "
-        "one "
-        "closes the outline, Delete takes the last one away; other drags orbit");
+        "one closes the outline, Delete takes the last one away; other drags orbit");
     const SceneFacts facts = s.edit.facts();  // a copy, as the buttons change it
     const Measurement& measured = facts.measured;
     if (measured.points.empty()) {
