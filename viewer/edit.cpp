@@ -543,8 +543,8 @@ SplatModel Edit::apply(const SplatModel& model) const {
         glm::dvec3 middle(0.0);
         for (std::size_t i = 0; i < out.size(); ++i)
             middle += position_of(out, i) / static_cast<double>(out.size());
-        out.place.offset += (out.metres_per_unit - facts_.metres_per_unit) *
-                            (out.place.rotation * middle);
+        out.place.offset +=
+            (out.metres_per_unit - facts_.metres_per_unit) * (out.place.rotation * middle);
     }
     out.metres_per_unit = facts_.metres_per_unit;
     keep_splats([&](std::size_t i) { return removed_[i] == 0; }, out);

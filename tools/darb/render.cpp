@@ -363,7 +363,8 @@ int render(RenderFlags flags) {
 void add_render(CLI::App& app, Action& action) {
     auto flags = std::make_shared<RenderFlags>();
     CLI::App* command = app.add_subcommand(
-        "render", "Render a scene to PNG files: from cameras, along a path, once around it, or without "
+        "render",
+        "Render a scene to PNG files: from cameras, along a path, once around it, or without "
         "perspective");
     command->add_option("scene", flags->scene, "splat file, or the output folder of darb train")
         ->required();

@@ -49,11 +49,11 @@ void make_one(Session& s) {
     ImGui::InputInt("faces", &w.faces, 0);
     tip("Simplify the mesh to so many faces; 0 keeps all");
     w.faces = std::max(w.faces, 0);
-    ImGui::Checkbox("thin things", &w.thin);
+    ImGui::Checkbox("thin parts", &w.thin);
     tip("Keep what is as thin as a voxel; this takes longer");
     ImGui::BeginDisabled(s.photos.views.empty());
     ImGui::SameLine();
-    ImGui::Checkbox("from around", &w.around);
+    ImGui::Checkbox("cameras around it", &w.around);
     ImGui::EndDisabled();
     tip(s.photos.views.empty() ? "There are no cameras of photos: 32 around the scene see it"
                                : "Use 32 cameras around the scene, not those of the photos");
