@@ -398,16 +398,16 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
 template <class T>
 void add_tile_profile(const TileLists& lists, size_t tile,
                       const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,
-                      const RenderSettings& settings, const ImageGradient<T>& d_image, T support,
-                      std::span<T> sums) {
+                      const RenderSettings& settings, const ImageGradient<T>& d_image,
+                      const ProfileTarget<T>& to) {
     const std::vector<ProjectedSplat<T>> list = gather(lists, tile, splats);
     tile_backward<T>(lists, tile, list, kernel, settings, d_image,
                      [&](const Blended<T>& b, T d_alpha, const PixelGradient<T>&) {
                          if (b.sample.clamped) return;
-                         const T u = std::max(1 - b.sample.q / support, T(0));
+                         const T u = std::max(1 - b.sample.q / to.support, T(0));
                          const T angle = std::acos(2 * std::sqrt(u) - 1);
-                         for (size_t k = 0; k < sums.size(); ++k)
-                             sums[k] += d_alpha * list[b.entry].opacity * std::cos(T(k) * angle);
+                         for (size_t k = 0; k < to.sums.size(); ++k)
+                             to.sums[k] += d_alpha * list[b.entry].opacity * std::cos(T(k) * angle);
                      });
 }
 
@@ -419,7 +419,7 @@ void add_tile_profile(const TileLists& lists, size_t tile,
         const RenderSettings&, const ImageGradient<T>&, ProjectedGradient<T>*);               \
     template void add_tile_profile(                                                           \
         const TileLists&, size_t, const std::vector<ProjectedSplat<T>>&, const KernelTable&,  \
-        const RenderSettings&, const ImageGradient<T>&, T, std::span<T>);
+        const RenderSettings&, const ImageGradient<T>&, const ProfileTarget<T>&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 #undef DARB_INSTANTIATE

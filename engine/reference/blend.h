@@ -71,13 +71,20 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                             const RenderSettings& settings, const ImageGradient<T>& d_image,
                             ProjectedGradient<T>* intersections);
 
+/// Sums for a profile with this support, R^2.
+template <class T>
+struct ProfileTarget {
+    T support;
+    std::span<T> sums;
+};
+
 /// Adds to sums[k] the sum over the tile's pixels and splats of opacity dL/dalpha T_k(2 sqrt(u) -
 /// 1), with T_k of Chebyshev and u = 1 - q/support: what the gradient of a learned profile is made
 /// of.
 template <class T>
 void add_tile_profile(const TileLists& lists, size_t tile,
                       const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,
-                      const RenderSettings& settings, const ImageGradient<T>& d_image, T support,
-                      std::span<T> sums);
+                      const RenderSettings& settings, const ImageGradient<T>& d_image,
+                      const ProfileTarget<T>& to);
 
 }  // namespace darb::reference

@@ -47,7 +47,7 @@ std::vector<double> sums_in_double(const BlendScene& scene, const Loss& loss) {
     for (size_t t = 0; t < lists.tile_count(); ++t)
         reference::add_tile_profile<double>(lists, t, scene.splats, scene.table(), scene.settings(),
                                             {loss.colour, loss.alpha, loss.depth},
-                                            kernel_support(scene.kernel), sums);
+                                            {kernel_support(scene.kernel), sums});
     return sums;
 }
 
