@@ -635,16 +635,16 @@ Camera first_camera(const CameraPath& path, const PixelSize& size) {
 nlohmann::json orthophoto_json(const Orthophoto& photo, const SplatModel& model, bool on_earth) {
     const glm::dmat3 rows = glm::transpose(photo.axes);
     const auto list = [](const glm::dvec3& v) { return nlohmann::json{v.x, v.y, v.z}; };
-    nlohmann::json json{{"width", photo.width},           {"height", photo.height},
-                        {"pixel", photo.pixel},           {"right", list(rows[0])},
-                        {"down", list(rows[1])},          {"forward", list(rows[2])},
-                        {"top_left", list(photo.corner)}, {"depth", photo.depth}};
-    if (model.metres_per_unit > 0) json["metres_per_unit"] = model.metres_per_unit;
+    nlohmann::json facts{{"width", photo.width},           {"height", photo.height},
+                         {"pixel", photo.pixel},           {"right", list(rows[0])},
+                         {"down", list(rows[1])},          {"forward", list(rows[2])},
+                         {"top_left", list(photo.corner)}, {"depth", photo.depth}};
+    if (model.metres_per_unit > 0) facts["metres_per_unit"] = model.metres_per_unit;
     if (on_earth)
-        json["anchor"] = {{"latitude", model.place.latitude},
-                          {"longitude", model.place.longitude},
-                          {"altitude", model.place.altitude}};
-    return json;
+        facts["anchor"] = {{"latitude", model.place.latitude},
+                           {"longitude", model.place.longitude},
+                           {"altitude", model.place.altitude}};
+    return facts;
 }
 
 }  // namespace
