@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: MIT
 """How near surfaces out of splats are to the truth, by kernel and by reading of the depth.
 
-    surface_table.py run OUT [--seeds N]    makes the generated scenes, and trains, reads and meshes each kernel
-    surface_table.py show OUT                                prints the tables of the page
+    surface_table.py run OUT [--seeds N] [--scenes NAME...]   makes the generated scenes, and trains, reads and meshes
+                                                              each kernel
+    surface_table.py show OUT|FILE.json                       prints the tables of the page
 
 A run of OUT/results.json is not made again, so a call that was stopped goes on where it ended. Seeds come last: one seed
 of all kernels is there before the next begins. DARB=, MAKE_SCENE= and DEPTH_READINGS= name other programs than those of
@@ -47,8 +48,9 @@ def call(*command):
     return done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def make_scenes(out):
-    for name, scene in SCENES.items():
+def make_scenes(out, scenes):
+    for name in scenes:
+        scene = SCENES[name]
         for what in ("photos", "truth"):
             folder = out / f"{name}_{what}"
             if folder.exists():
@@ -78,16 +80,16 @@ def measure(out, name, kernel, seed):
 
 
 def results_of(out):
-    path = out / "results.json"
+    path = out if out.suffix == ".json" else out / "results.json"
     return json.loads(path.read_text()) if path.exists() else []
 
 
-def run(out, seeds):
+def run(out, seeds, scenes):
     out.mkdir(parents=True, exist_ok=True)
-    make_scenes(out)
+    make_scenes(out, scenes)
     for seed in range(seeds):
         for kernel in KERNELS:
-            for name in SCENES:
+            for name in scenes:
                 results = results_of(out)
                 if any((r["scene"], r["kernel"], r["seed"]) == (name, kernel, seed) for r in results):
                     continue
@@ -110,12 +112,14 @@ def show(out):
     results = results_of(out)
     for name in SCENES:
         rows = [r for r in results if r["scene"] == name]
+        if not rows:
+            continue
         print(f"\n{name}: median error of depths in mm (bias of the median), by reading; {len(rows)} runs\n")
-        print("| kernel | " + " | ".join(READINGS) + " |\n|" + "---|" * (len(READINGS) + 1))
+        print("| kernel | seeds | " + " | ".join(READINGS) + " |\n|" + "---|" * (len(READINGS) + 2))
         for kernel in KERNELS:
             own = [r for r in rows if r["kernel"] == kernel]
             if own:
-                print(f"| {kernel} | " + " | ".join(
+                print(f"| {kernel} | {len(own)} | " + " | ".join(
                     cell([1000 * r["depths"][d]["median"] for r in own], 1) +
                     f" ({statistics.mean(1000 * r['depths'][d]['bias'] for r in own):+.1f})" for d in READINGS) + " |")
         print("\n| kernel | accuracy, median mm | completeness, median mm | F, small | F, large | PSNR dB | splats | "
@@ -138,9 +142,10 @@ def main():
     parser.add_argument("what", choices=["run", "show"])
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--scenes", nargs="+", choices=list(SCENES), default=list(SCENES))
     arguments = parser.parse_args()
     if arguments.what == "run":
-        run(arguments.out, arguments.seeds)
+        run(arguments.out, arguments.seeds, arguments.scenes)
     show(arguments.out)
 
 

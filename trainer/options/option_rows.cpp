@@ -294,7 +294,7 @@ const OptionRow kRows[] = {
     {.flags = "--learn-kernel",
      .setting = "/learn_kernel",
      .member = &Opt::learn_kernel,
-     .group = option_group::kScene,
+     .group = option_group::kRates,
      .help = "learn the kernel's profile together with the splats, starting from that of --kernel, "
              "in this many changes over the run, such as 10; 0: it stays as it is",
      .most = 500,
