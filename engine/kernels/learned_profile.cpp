@@ -105,11 +105,11 @@ Values on_simplex(const Values& v) {
 
 // Projected gradient with Nesterov's momentum: six unknowns, a millisecond.
 Values nearest_weights(const std::function<double(double)>& f) {
-    constexpr int kPoints = 200, kIterations = 5'000;
+    constexpr int kFitPoints = 200, kFitSteps = 5'000;
     std::array<Values, kTerms> matrix{};
     Values right{};
-    for (int i = 0; i < kPoints; ++i) {
-        const double u = (i + 0.5) / kPoints, target = f(u);
+    for (int i = 0; i < kFitPoints; ++i) {
+        const double u = (i + 0.5) / kFitPoints, target = f(u);
         const Values row = partial_sums(u);
         for (std::size_t j = 0; j < kTerms; ++j) {
             right[j] += row[j] * target;
@@ -125,7 +125,7 @@ Values nearest_weights(const std::function<double(double)>& f) {
     Values p, y;
     p.fill(1.0 / kTerms);
     y = p;
-    for (double t = 1, i = 0; i < kIterations; ++i) {
+    for (double t = 1, i = 0; i < kFitSteps; ++i) {
         Values down = y;
         for (std::size_t j = 0; j < kTerms; ++j) down[j] -= (dot(matrix[j], y) - right[j]) / most;
         const Values next = on_simplex(down);
@@ -234,16 +234,16 @@ Values LearnedProfile::by_logits(Footprint footprint, double q) const {
 Values LearnedProfile::gradient(Footprint footprint, std::span<const float> sums) const {
     DARB_CHECK(sums.size() == PROFILE_SUMS, "{} sums", sums.size());
     static_assert(PROFILE_SUMS == 2 * kDegree + 2);
-    constexpr int kNodes = 32;
+    constexpr int kSumNodes = 32;
     const Parts now = parts();
     Values gradient{};
-    for (int i = 0; i < kNodes; ++i) {
-        const double angle = std::numbers::pi * (i + 0.5) / kNodes;
+    for (int i = 0; i < kSumNodes; ++i) {
+        const double angle = std::numbers::pi * (i + 0.5) / kSumNodes;
         const double root = (1 + std::cos(angle)) / 2;
         const Values at = slopes(now, footprint, root * root);
         double share = 0;  // of this node in the sum over terms
         for (std::size_t k = 0; k < PROFILE_SUMS; ++k)
-            share += (k == 0 ? 1.0 : 2.0) / kNodes * std::cos(static_cast<double>(k) * angle) *
+            share += (k == 0 ? 1.0 : 2.0) / kSumNodes * std::cos(static_cast<double>(k) * angle) *
                      double(sums[k]);
         for (std::size_t j = 0; j < kTerms; ++j) gradient[j] += share * at[j];
     }
@@ -262,13 +262,13 @@ KernelDefinition LearnedProfile::definition() const {
 }
 
 double LearnedProfile::distance_from_start() const {
-    constexpr int kGrid = 1'000;
+    constexpr int kCompared = 1'000;
     const double of_start =
         std::isfinite(kernel_support(start_)) ? kernel_support(start_) : kGaussianEdge;
     const double end = std::max(support(), of_start);
     double largest = 0;
-    for (int i = 0; i < kGrid; ++i) {
-        const double q = end * i / kGrid;
+    for (int i = 0; i < kCompared; ++i) {
+        const double q = end * i / kCompared;
         largest = std::max(
             largest, std::abs(value(Footprint::psi, q) - kernel_value(start_, Footprint::psi, q)));
     }
