@@ -2,9 +2,9 @@
 #include "engine/data/gps.h"
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
@@ -48,67 +48,19 @@ struct Fit {
     dvec3 operator()(const dvec3& from) const { return scale * (rotation * from) + offset; }
 };
 
-/// The eigenvector of the largest eigenvalue of a symmetric 4 x 4 matrix, by Jacobi rotations.
-std::array<double, 4> largest_eigenvector(std::array<std::array<double, 4>, 4> m) {
-    std::array<std::array<double, 4>, 4> v{};
-    for (std::size_t i = 0; i < 4; ++i) v[i][i] = 1;
-    for (int sweep = 0; sweep < 30; ++sweep)
-        for (std::size_t p = 0; p < 3; ++p)
-            for (std::size_t q = p + 1; q < 4; ++q) {
-                if (m[p][q] == 0) continue;
-                const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
-                const double t =
-                    (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-                const double c = 1 / std::sqrt(t * t + 1), s = t * c;
-                for (std::size_t k = 0; k < 4; ++k) {
-                    const double a = m[k][p], b = m[k][q];
-                    m[k][p] = c * a - s * b;
-                    m[k][q] = s * a + c * b;
-                }
-                for (std::size_t k = 0; k < 4; ++k) {
-                    const double a = m[p][k], b = m[q][k];
-                    m[p][k] = c * a - s * b;
-                    m[q][k] = s * a + c * b;
-                    const double x = v[k][p], y = v[k][q];
-                    v[k][p] = c * x - s * y;
-                    v[k][q] = s * x + c * y;
-                }
-            }
-    std::size_t best = 0;
-    for (std::size_t i = 1; i < 4; ++i)
-        if (m[i][i] > m[best][best]) best = i;
-    return {v[0][best], v[1][best], v[2][best], v[3][best]};
-}
-
-// Least squares (Horn 1987), with the scale from the spreads of both.
+// Least squares (Umeyama 1991).
 Fit fit_similarity(const std::vector<dvec3>& from, const std::vector<dvec3>& to) {
-    const double count = static_cast<double>(from.size());
-    dvec3 a(0.0), b(0.0);
-    for (std::size_t i = 0; i < from.size(); ++i) {
-        a += from[i] / count;
-        b += to[i] / count;
-    }
-    double s[3][3] = {}, spread_a = 0, spread_b = 0;
-    for (std::size_t i = 0; i < from.size(); ++i) {
-        const dvec3 x = from[i] - a, y = to[i] - b;
-        for (glm::length_t r = 0; r < 3; ++r)
-            for (glm::length_t c = 0; c < 3; ++c) s[r][c] += x[r] * y[c];
-        spread_a += glm::dot(x, x);
-        spread_b += glm::dot(y, y);
-    }
-    const auto q = largest_eigenvector(
-        {{{s[0][0] + s[1][1] + s[2][2], s[1][2] - s[2][1], s[2][0] - s[0][2], s[0][1] - s[1][0]},
-          {s[1][2] - s[2][1], s[0][0] - s[1][1] - s[2][2], s[0][1] + s[1][0], s[2][0] + s[0][2]},
-          {s[2][0] - s[0][2], s[0][1] + s[1][0], s[1][1] - s[0][0] - s[2][2], s[1][2] + s[2][1]},
-          {s[0][1] - s[1][0], s[2][0] + s[0][2], s[1][2] + s[2][1], s[2][2] - s[0][0] - s[1][1]}}});
-    const double w = q[0], x = q[1], y = q[2], z = q[3];
+    const auto matrix = [](const std::vector<dvec3>& points) {
+        return Eigen::Map<const Eigen::Matrix3Xd>(&points[0].x, 3,
+                                                  static_cast<Eigen::Index>(points.size()));
+    };
+    const Eigen::Matrix4d best = Eigen::umeyama(matrix(from), matrix(to));
     Fit fit;
-    fit.rotation = glm::transpose(
-        dmat3(dvec3(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-              dvec3(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-              dvec3(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))));
-    fit.scale = spread_a > 0 ? std::sqrt(spread_b / spread_a) : 0;
-    fit.offset = b - fit.scale * (fit.rotation * a);
+    fit.scale = best.block<3, 1>(0, 0).norm();
+    if (!(fit.scale > 0)) return {};  // all points are one
+    for (glm::length_t c = 0; c < 3; ++c)
+        for (glm::length_t r = 0; r < 3; ++r) fit.rotation[c][r] = best(r, c) / fit.scale;
+    fit.offset = {best(0, 3), best(1, 3), best(2, 3)};
     return fit;
 }
 
