@@ -143,12 +143,15 @@ class PanoramaCameras {
     fs::path data_set();
 
   private:
-    int view_side() const;
+    int view_side();
     void cut_views(int side) const;
     std::vector<View> masked() const;
     void cut_masks(int side, const fs::path& masks) const;
     void write_pairs(const fs::path& file) const;
-    std::vector<std::optional<PanoramaPose>> poses_of(const ColmapModel& model) const;
+    using Poses = std::vector<std::optional<PanoramaPose>>;
+    Poses poses_of(const ColmapModel& model) const;
+    std::string points_text(const ColmapModel& model, const Poses& poses,
+                            std::vector<std::string>& observed) const;
     void write_data_set(const ColmapModel& model) const;
     void link_photos(const fs::path& from, const fs::path& to,
                      const std::vector<std::string>& names) const;
@@ -160,11 +163,12 @@ class PanoramaCameras {
     const std::vector<std::string>& names_;
     const ColmapReports& reports_;
     std::map<std::string, ViewSource> sources_;  // by the view's name
+    std::vector<std::pair<int, int>> sizes_;     // of the panoramas, px
     fs::path cut_ = run_.workspace / "views", inner_ = run_.workspace / "of_views";
 };
 
 // All views have one size, so that COLMAP has one camera: that of the smallest panorama.
-int PanoramaCameras::view_side() const {
+int PanoramaCameras::view_side() {
     int side = kMostViewSide;
     for (const std::string& name : names_) {
         const ImageInfo info = read_image_info(run_.photos / name);
@@ -174,6 +178,7 @@ int PanoramaCameras::view_side() const {
                                     "twice as wide as high",
                                     info.width, info.height),
                         "Leave it out, or use --panoramas off for flat photos.");
+        sizes_.emplace_back(info.width, info.height);
         side = std::min(side, face_size(info.width));
     }
     return side;
@@ -254,7 +259,7 @@ void PanoramaCameras::write_pairs(const fs::path& file) const {
     write_file_atomic(file, text);
 }
 
-std::vector<std::optional<PanoramaPose>> PanoramaCameras::poses_of(const ColmapModel& model) const {
+PanoramaCameras::Poses PanoramaCameras::poses_of(const ColmapModel& model) const {
     std::vector<std::vector<PanoramaPose>> said(names_.size());
     for (const ColmapImage& image : model.images) {
         const auto at = sources_.find(image.name);
@@ -270,7 +275,7 @@ std::vector<std::optional<PanoramaPose>> PanoramaCameras::poses_of(const ColmapM
         last = views.front().centre();
     }
     const double reach = steps.empty() ? 0 : kAgreeReach * median(steps);
-    std::vector<std::optional<PanoramaPose>> poses;
+    Poses poses;
     std::size_t lonely = 0, differ = 0;
     for (const auto& views : said) {
         poses.push_back(agreed_pose(views, reach));
@@ -294,68 +299,60 @@ void PanoramaCameras::link_photos(const fs::path& from, const fs::path& to,
     }
 }
 
-/// A point of the model as the panoramas see it.
-struct SeenPoint {
-    std::vector<std::pair<std::size_t, std::size_t>> track;  // panorama, number of its observation
-};
-
-void PanoramaCameras::write_data_set(const ColmapModel& model) const {
-    const std::vector<std::optional<PanoramaPose>> poses = poses_of(model);
+// The points with their tracks; `observed` gets, for each panorama, where it sees them.
+std::string PanoramaCameras::points_text(const ColmapModel& model, const Poses& poses,
+                                         std::vector<std::string>& observed) const {
     std::map<std::uint32_t, ViewSource> by_id;
     for (const ColmapImage& image : model.images)
         if (const auto at = sources_.find(image.name); at != sources_.end())
             by_id[image.id] = at->second;
-    std::map<std::pair<int, int>, std::size_t> cameras;  // by size
-    std::vector<std::pair<int, int>> sizes;
-    for (const std::string& name : names_) {
-        const ImageInfo info = read_image_info(run_.photos / name);
-        sizes.emplace_back(info.width, info.height);
-        cameras.try_emplace(sizes.back(), cameras.size() + 1);
-    }
-    std::vector<std::string> observed(names_.size());
     std::vector<std::size_t> counts(names_.size());
-    std::string points = kMadeBy;
+    std::string text = kMadeBy;
     const PointCloud& cloud = model.points;
-    for (std::size_t p = 0; p < cloud.size(); ++p) {
-        SeenPoint point;
-        for (std::size_t k = cloud.has_tracks() ? cloud.seen_begin[p] : 0;
-             cloud.has_tracks() && k < cloud.seen_begin[p + 1]; ++k) {
+    for (std::size_t p = 0; cloud.has_tracks() && p < cloud.size(); ++p) {
+        std::map<std::size_t, std::size_t> track;  // number of the observation, by panorama
+        for (std::size_t k = cloud.seen_begin[p]; k < cloud.seen_begin[p + 1]; ++k) {
             const auto at = by_id.find(cloud.seen_by[k]);
-            if (at == by_id.end() || !poses[at->second.panorama]) continue;
-            const std::size_t panorama = at->second.panorama;
-            const auto same = [&](const auto& seen) { return seen.first == panorama; };
-            if (std::ranges::any_of(point.track, same)) continue;  // in two of its views
+            if (at == by_id.end()) continue;
+            const auto [panorama, view] = at->second;
+            if (!poses[panorama] || track.contains(panorama)) continue;  // or in two of its views
             const glm::dvec3 ray(2.0 * cloud.seen_at[2 * k] - 1, 2.0 * cloud.seen_at[2 * k + 1] - 1,
                                  1);
-            const glm::dmat3 back = glm::transpose(panorama_views()[at->second.view].rotation);
             const glm::dvec2 pixel =
-                panorama_pixel(back * ray, sizes[panorama].first, sizes[panorama].second);
+                panorama_pixel(glm::transpose(panorama_views()[view].rotation) * ray,
+                               sizes_[panorama].first, sizes_[panorama].second);
             if (!std::isfinite(pixel.x) || !std::isfinite(pixel.y)) continue;
             observed[panorama] += fmt::format("{:.4f} {:.4f} {} ", pixel.x, pixel.y, p + 1);
-            point.track.emplace_back(panorama, counts[panorama]++);
+            track[panorama] = counts[panorama]++;
         }
-        if (point.track.empty()) continue;
-        points +=
-            fmt::format("{} {:.9g} {:.9g} {:.9g} {} {} {} 0", p + 1, cloud.position[3 * p],
-                        cloud.position[3 * p + 1], cloud.position[3 * p + 2], cloud.colour[3 * p],
-                        cloud.colour[3 * p + 1], cloud.colour[3 * p + 2]);
-        for (const auto& [panorama, number] : point.track)
-            points += fmt::format(" {} {}", panorama + 1, number);
-        points += "\n";
+        if (track.empty()) continue;
+        text += fmt::format("{} {:.9g} {:.9g} {:.9g} {} {} {} 0", p + 1, cloud.position[3 * p],
+                            cloud.position[3 * p + 1], cloud.position[3 * p + 2],
+                            cloud.colour[3 * p], cloud.colour[3 * p + 1], cloud.colour[3 * p + 2]);
+        for (const auto& [panorama, number] : track)
+            text += fmt::format(" {} {}", panorama + 1, number);
+        text += "\n";
     }
+    return text;
+}
+
+void PanoramaCameras::write_data_set(const ColmapModel& model) const {
+    const Poses poses = poses_of(model);
+    std::vector<std::string> observed(names_.size()), found;
+    const std::string points = points_text(model, poses, observed);
+    std::map<std::pair<int, int>, std::size_t> cameras;  // by size
     std::string lens = kMadeBy, images = kMadeBy;
-    for (const auto& [size, id] : cameras)
-        lens += fmt::format("{} EQUIRECTANGULAR {} {} {} {}\n", id, size.first, size.second,
-                            size.first, size.second);
-    std::vector<std::string> found;
     for (std::size_t p = 0; p < names_.size(); ++p) {
         if (!poses[p]) continue;
+        const auto [camera, is_new] = cameras.try_emplace(sizes_[p], cameras.size() + 1);
+        if (is_new)
+            lens += fmt::format("{0} EQUIRECTANGULAR {1} {2} {1} {2}\n", camera->second,
+                                sizes_[p].first, sizes_[p].second);
         const glm::dquat q = glm::quat_cast(poses[p]->rotation);
         const glm::dvec3& t = poses[p]->translation;
-        images +=
-            fmt::format("{} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {} {}\n", p + 1,
-                        q.w, q.x, q.y, q.z, t.x, t.y, t.z, cameras.at(sizes[p]), names_[p]) +
-            observed[p] + "\n";
+        images += fmt::format(
+            "{} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {} {}\n{}\n", p + 1, q.w,
+            q.x, q.y, q.z, t.x, t.y, t.z, camera->second, names_[p], observed[p]);
         found.push_back(names_[p]);
     }
     const fs::path dense = run_.workspace / "dense",
