@@ -111,18 +111,18 @@ TEST(FilmCommand, Lens_and_shutter_blur_films) {
         {"seconds": 1, "eye": [1, 0, -4], "orientation": [1, 0, 0, 0], "fov_y_degrees": 50}]})");
     const auto frame = [&](const std::string& name, const std::string& more) {
         const std::string folder = scratch() / name;
-        const Outcome o =
-            darb(fmt::format("render {} --path {} -o {} --size 64x48 --fps 2 --samples 8 {}", ply,
-                             path, folder, more));
+        const Outcome o = darb(fmt::format("render {} --path {} -o {} --size 64x48 --fps 2 {}", ply,
+                                           path, folder, more));
         EXPECT_EQ(o.code, 0) << o.err;
         return read_image(folder + "/frame_00001.png").data;
     };
     const auto sharp = frame("sharp", "");
-    EXPECT_NE(frame("moved", "--shutter 180"), sharp);
-    EXPECT_NE(frame("open", "--aperture 0.2 --focus 4"), sharp);
+    EXPECT_NE(frame("moved", "--shutter 180 --samples 8"), sharp);
+    EXPECT_NE(frame("open", "--aperture 0.2 --focus 4 --samples 8"), sharp);
     EXPECT_EQ(frame("closed", "--aperture 0 --shutter 0"), sharp);
     const std::string render = fmt::format("render {} --path {} -o x ", ply, path);
     expect_refused({{render + "--focus 2", "--aperture"},
+                    {render + "--samples 8", "--shutter"},
                     {render + "--aperture 1 --projection equirectangular", "--aperture"},
                     {render + "--force", "--force"},
                     {fmt::format("render {} --cameras c -o x --shutter 90", ply), "--shutter"}});

@@ -62,7 +62,7 @@ constexpr const char *kPerspective = "perspective", *kEquirectangular = "equirec
 struct BlurFlags {
     double aperture = 0, shutter = 0;  // world units; degrees of a turn of a film's shutter
     std::optional<double> focus;       // world units; absent: what is in the middle
-    int samples = 32;
+    std::optional<int> samples;        // absent: as CameraBlur has them
 };
 
 struct OrthophotoFlags {
@@ -152,7 +152,8 @@ void check_projection(const RenderFlags& flags) {
 // What the lens and the shutter blur in a picture of this camera.
 CameraBlur blur_of(const RenderFlags& flags, const SplatModel& model, const Camera& camera,
                    const std::string& where) {
-    CameraBlur blur{.aperture = flags.blur.aperture, .samples = flags.blur.samples};
+    CameraBlur blur{.aperture = flags.blur.aperture};
+    if (flags.blur.samples) blur.samples = *flags.blur.samples;
     if (!(blur.aperture > 0)) return blur;
     if (camera.lens.active)
         throw Error(where, "its lens is kept, and --aperture works on straight pictures only",
@@ -173,6 +174,9 @@ void check_blur(const RenderFlags& flags) {
                     "Use it with --path or a turn.");
     if (!(flags.blur.aperture > 0) && flags.blur.focus)
         throw Error("--focus", "changes nothing, as everything is sharp", "Add --aperture.");
+    if (!(flags.blur.aperture > 0) && !(flags.blur.shutter > 0) && flags.blur.samples)
+        throw Error("--samples", "changes nothing, as everything is sharp",
+                    "Add --aperture or --shutter.");
     if (flags.blur.aperture > 0 && !flags.depth.format.empty())
         throw Error("--depth", "would be that of one point of the lens", "Leave --aperture out.");
     if ((flags.blur.aperture > 0 || flags.blur.shutter > 0) && flags.projection != kPerspective)
@@ -576,7 +580,7 @@ void add_blur_flags(CLI::App& c, BlurFlags& flags) {
         ->capture_default_str()
         ->check(CLI::Range(0.0, 360.0));
     c.add_option("--samples", flags.samples, "how many sharp pictures a blurred one is the mean of")
-        ->capture_default_str()
+        ->default_str(std::to_string(CameraBlur().samples))
         ->check(CLI::Range(2, 4096));
 }
 

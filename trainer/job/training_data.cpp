@@ -360,6 +360,11 @@ Dataset load_training_data(TrainRequest& request, std::optional<RunLock>& lock,
               : photos_without_cameras(request.dataset, request.data.images_folder);
     Dataset dataset = photos.empty() ? load_dataset(request.dataset, request.data)
                                      : load_through_colmap(photos, request, lock, sinks);
+    if (photos.empty() && request.panoramas != "auto")
+        dataset.notes.push_back(
+            fmt::format("--panoramas {} changes nothing: the data set has cameras, which say what "
+                        "its photos show.",
+                        request.panoramas));
     if (dataset.points.size() == 0) dataset.notes.push_back("There are no sparse points.");
     if (request.train.random_points && dataset.points.size() > 0)
         dataset.notes.push_back(
