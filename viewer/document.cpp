@@ -37,6 +37,12 @@ bool any_lens(const std::vector<View>& views) {
                        [](const View& v) { return v.camera.lens.active; });
 }
 
+// Pictures of a window have all rows of one moment.
+std::vector<View> without_shutters(std::vector<View> views) {
+    for (View& view : views) view.camera.shutter = {};
+    return views;
+}
+
 // Edits are saved beside the scene, in its format where that can be written. Those of a run go into
 // its output folder, where its cameras are.
 fs::path edited_name(const fs::path& file) {
@@ -62,7 +68,7 @@ Document::Document(Session& session, ViewerOptions options)
       loader_(options_.resolve, options_.wake),
       remembered_(options_.up_list),
       recent_(options_.recent_list) {
-    session.photos.views = options_.views;
+    session.photos.views = without_shutters(options_.views);
     session.navigation.set_up(start_up(options_));
     session.display.accuracy = options_.accuracy;
     // These apply to each scene that is opened; see show_as_meant.
@@ -279,7 +285,7 @@ void Document::find_own_cameras(const std::filesystem::path& scene,
     leave_photo(*session_);
     session_->photos = Photos();
     try {
-        session_->photos.views = options_.find_cameras(scene);
+        session_->photos.views = without_shutters(options_.find_cameras(scene));
     } catch (const std::exception& e) {
         notes.emplace_back(e.what());
     }

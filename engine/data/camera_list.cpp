@@ -74,6 +74,13 @@ View parse_view(const json& record, std::string where) {
     const glm::dvec3 centre = vector3(record.value("position", json()), "position", where);
     check_position(centre, where);
     camera.translation = -(camera.rotation * centre);
+    if (const auto shutter = record.find("shutter"); shutter != record.end()) {
+        if (!shutter->is_object()) throw Error(where, "shutter is not an object", kCorrectRecord);
+        camera.shutter = {true, vector3(shutter->value("turn", json()), "turn", where),
+                          vector3(shutter->value("move", json()), "move", where)};
+        check_position(camera.shutter.turn, where);
+        check_position(camera.shutter.move, where);
+    }
     return view;
 }
 
@@ -218,6 +225,9 @@ std::string format_camera_list(const std::vector<View>& views) {
                        {"fx", camera.fx}};
         if (camera.cx != 0.5 * camera.width) record["cx"] = camera.cx;
         if (camera.cy != 0.5 * camera.height) record["cy"] = camera.cy;
+        if (const auto& [rolls, turn, move] = camera.shutter; rolls)
+            record["shutter"] = {{"turn", {turn.x, turn.y, turn.z}},
+                                 {"move", {move.x, move.y, move.z}}};
         list.push_back(std::move(record));
     }
     // Names may hold any bytes.

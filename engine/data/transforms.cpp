@@ -171,11 +171,66 @@ CameraToWorld read_matrix(const json& object, const char* key, const std::string
     return pose;
 }
 
+/// How the file says that rows are exposed one after the other.
+struct Readout {
+    double seconds = 0;  // from the first row to the last, for frames that have velocities
+    // instant-ngp: the share of the way from transform_matrix_start to _end at which the middle row
+    // is exposed, and that by which the last is later than the first.
+    double middle = 0.5, rows = 0;
+    bool blurs = false;  // pixels are exposed for a while, which is not drawn
+};
+
 /// What is noted once for all frames.
 struct PoseTally {
-    std::size_t scaled = 0, halfway = 0, moving = 0;
+    std::size_t scaled = 0, halfway = 0, moving = 0, rolling = 0;
     bool mitsuba = false;  // the file's camera axes: x to the left, y up, z forwards
+    Readout readout;
 };
+
+/// Reads rolling_shutter_time and rolling_shutter; an absent key says that all rows are exposed at
+/// once.
+Readout read_readout(const json& root, const std::string& where) {
+    Readout readout;
+    std::optional<double> seconds;
+    read_number(root, "rolling_shutter_time", where, seconds);
+    readout.seconds = seconds.value_or(0);
+    const auto ngp = root.find("rolling_shutter");
+    if (ngp == root.end() || !ngp->is_array()) return readout;
+    std::array<double, 4> v{};
+    if (ngp->size() < 3 || ngp->size() > v.size())
+        throw Error(where, fmt::format("rolling_shutter has {} numbers, not 3 or 4", ngp->size()),
+                    "Write it as [t, by column, by row, blur].");
+    for (std::size_t i = 0; i < ngp->size(); ++i) {
+        if (!(*ngp)[i].is_number())
+            throw Error(where, "rolling_shutter does not hold numbers",
+                        "Write it as [t, by column, by row, blur].");
+        v[i] = (*ngp)[i].get<double>();
+    }
+    if (v[1] != 0)
+        throw Error(where,
+                    fmt::format("rolling_shutter exposes columns one after the other ({:g})", v[1]),
+                    "Turn photos and poses by 90 degrees, so that rows are.");
+    if (v[2] == 0 && v[3] == 0) return readout;
+    readout.middle = v[0] + 0.5 * (v[2] + v[3]);
+    readout.rows = v[2];
+    readout.blurs = v[3] != 0;
+    return readout;
+}
+
+/// Three numbers of a key; nothing where it is absent.
+std::optional<glm::dvec3> read_vector(const json& object, const char* key,
+                                      const std::string& where) {
+    const auto at = object.find(key);
+    if (at == object.end() || at->is_null()) return std::nullopt;
+    glm::dvec3 v;
+    for (int c = 0; c < 3; ++c) {
+        const auto k = static_cast<std::size_t>(c);
+        if (!at->is_array() || at->size() != 3 || !(*at)[k].is_number())
+            throw Error(where, fmt::format("{} does not hold 3 numbers", key), kCorrectEntry);
+        v[c] = (*at)[k].get<double>();
+    }
+    return v;
+}
 
 /// A pose in the file's frame, with COLMAP's camera axes.
 CameraToWorld read_camera_to_world(const json& object, const char* key, const std::string& where,
@@ -191,27 +246,44 @@ CameraToWorld read_camera_to_world(const json& object, const char* key, const st
 
 /// Reads transform_matrix or, where only the poses at the start and the end of an exposure are
 /// given, the pose halfway.
+/// With a rolling shutter that of the middle row, and how it moves from the first to the last.
 void read_pose(const json& object, const std::string& where, PoseTally& tally,
                TransformsFrame& frame) {
     constexpr const char *kStart = "transform_matrix_start", *kEnd = "transform_matrix_end";
     constexpr double kStill = 1e-9;
     const bool has_ends = object.contains(kStart) && object.contains(kEnd);
+    const Readout& readout = tally.readout;
     CameraToWorld pose;
     if (object.contains("transform_matrix") || !has_ends) {
         pose = read_camera_to_world(object, "transform_matrix", where, tally);
+        const auto move = read_vector(object, "camera_linear_velocity", where);
+        const auto turn = read_vector(object, "camera_angular_velocity", where);
+        // Along the axes of the file; world to camera turns the other way than camera to world.
+        const glm::dvec3 axes(tally.mitsuba ? -1 : 1, -1, tally.mitsuba ? 1 : -1);
+        frame.shutter.move = readout.seconds * axes * move.value_or(glm::dvec3(0.0));
+        frame.shutter.turn = -readout.seconds * axes * turn.value_or(glm::dvec3(0.0));
     } else {
         pose = read_camera_to_world(object, kStart, where, tally);
         const CameraToWorld end = read_camera_to_world(object, kEnd, where, tally);
         double apart = glm::distance(pose.centre, end.centre);
         for (int c = 0; c < 3; ++c) apart += glm::distance(pose.axes[c], end.axes[c]);
         const glm::dquat a = glm::quat_cast(pose.axes), b = glm::quat_cast(end.axes);
-        if (apart > kStill) pose.axes = glm::mat3_cast(glm::slerp(a, b, 0.5));
-        pose.centre = 0.5 * (pose.centre + end.centre);
+        const glm::dvec3 way = end.centre - pose.centre;
+        if (apart > kStill) pose.axes = glm::mat3_cast(glm::slerp(a, b, readout.middle));
+        pose.centre += readout.middle * way;
+        const glm::dquat turn = glm::normalize(b * glm::conjugate(a));
+        const glm::dquat nearest = turn.w < 0 ? -turn : turn;
+        frame.shutter.move = readout.rows * (way * pose.axes);
+        frame.shutter.turn = -readout.rows * glm::angle(nearest) * (glm::axis(nearest) * pose.axes);
         ++tally.halfway;
         tally.moving += apart > kStill ? 1 : 0;
     }
     frame.rotation = glm::transpose(pose.axes);
     frame.translation = -(frame.rotation * pose.centre);
+    check_position(frame.shutter.move, where);
+    check_position(frame.shutter.turn, where);
+    frame.shutter.active = glm::length(frame.shutter.move) + glm::length(frame.shutter.turn) > 0;
+    tally.rolling += frame.shutter.active ? 1 : 0;
 }
 
 /// COLMAP's name for a nerfstudio or instant-ngp camera model.
@@ -307,6 +379,9 @@ constexpr std::string_view kReadKeys[] = {"frames",
                                           "transform_matrix",
                                           "transform_matrix_start",
                                           "transform_matrix_end",
+                                          "rolling_shutter_time",
+                                          "camera_linear_velocity",
+                                          "camera_angular_velocity",
                                           "time"};
 constexpr std::string_view kHarmlessKeys[] = {"aabb",
                                               "aabb_scale",
@@ -407,10 +482,11 @@ bool sounds_meaningful(std::string_view key) {
 /// Collects keys of the file and its frames that are not read although they may matter.
 class UnreadKeys {
   public:
-    void look_at(const json& object, const std::string& where) {
+    /// read: a key that is read in this object alone.
+    void look_at(const json& object, const std::string& where, std::string_view read = {}) {
         for (const auto& [key, value] : object.items()) {
             const std::string_view name = key;
-            if (std::ranges::find(kReadKeys, name) != std::end(kReadKeys) ||
+            if (name == read || std::ranges::find(kReadKeys, name) != std::end(kReadKeys) ||
                 std::ranges::find(kHarmlessKeys, name) != std::end(kHarmlessKeys) ||
                 !says_something(value))
                 continue;
@@ -549,6 +625,15 @@ void note_frames(const FrameTally& tally, const std::string& where, TransformsFi
             "{} of {} frames have no transform_matrix, but a start and an end: the pose is the one "
             "halfway, and {} of them move.",
             tally.poses.halfway, count, tally.poses.moving));
+    if (tally.poses.rolling > 0)
+        file.notes.push_back(fmt::format(
+            "{} of {} frames have a rolling shutter: their rows are exposed one after the other.",
+            tally.poses.rolling, count));
+    if (tally.poses.rolling == 0 && tally.poses.readout.seconds + tally.poses.readout.rows != 0)
+        file.notes.push_back(fmt::format(
+            "Warning: {} says how long the rows of a photo take, but no frame says how the camera "
+            "moves meanwhile: each photo is taken for exposed at one moment.",
+            where));
     if (tally.odd_angles > 0)
         file.notes.push_back(fmt::format(
             "Warning: in {} of {} frames of {} fl_x or fl_y is not what camera_angle_x or "
@@ -581,9 +666,11 @@ TransformsFile parse_transforms(std::string_view text, const std::string& where)
     read_depth_unit(root, where, file);
     read_split(root, file);
     FrameTally tally;
+    tally.poses.readout = read_readout(root, where);
     tally.poses.mitsuba = read_bool(root, "from_mitsuba", where, false);
     UnreadKeys unread;
-    unread.look_at(root, where);
+    const Readout& readout = tally.poses.readout;
+    unread.look_at(root, where, readout.rows != 0 && !readout.blurs ? "rolling_shutter" : "");
     const json& frames = root["frames"];
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const std::string record = fmt::format("{}, frame {} of {}", where, i + 1, frames.size());
@@ -821,6 +908,7 @@ void add_frames(const fs::path& listing, bool is_test, const DatasetOptions& opt
         view.crop_radius = frame.intrinsics.crop_radius;
         view.camera.rotation = frame.rotation;
         view.camera.translation = frame.translation;
+        view.camera.shutter = frame.shutter;
         view.is_test = is_test || test_names.contains(view.name);
         if (!train_names.empty() && !view.is_test && !train_names.contains(view.name)) {
             ++declared.of_no_split;

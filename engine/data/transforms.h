@@ -30,8 +30,9 @@ struct TransformsFrame {
     std::string mask_path;   // may be empty
     std::string depth_path;  // depth_file_path or instant-ngp's depth_path, may be empty
     TransformsIntrinsics intrinsics;
-    glm::dmat3 rotation{1.0};  // world to camera, COLMAP's axes
+    glm::dmat3 rotation{1.0};  // world to camera, COLMAP's axes; with a shutter, of the middle row
     glm::dvec3 translation{0.0};
+    ShutterTerms shutter;
 };
 
 struct TransformsFile {
@@ -52,8 +53,12 @@ struct TransformsFile {
 /// transform_matrix is camera to world with OpenGL's camera axes (y up, looking down -z). The
 /// writer has already applied nerfstudio's applied_transform to the frames and the PLY alike, so
 /// both stay in the file's frame; so do instant-ngp's scale and offset, which it applies when it
-/// reads. Numbers may be given as strings, and rotations may contain a scale. Throws Error(where
-/// and frame, reason), also where two keys for one fact disagree.
+/// reads. A rolling shutter is read in two forms: rolling_shutter_time, seconds, with
+/// camera_linear_velocity and camera_angular_velocity of each frame, in units a second along the
+/// axes of transform_matrix, the pose of the middle row; and instant-ngp's rolling_shutter
+/// [t, by column, by row, blur] with transform_matrix_start and _end. Numbers may be given as
+/// strings, and rotations may contain a scale. Throws Error(where and frame, reason), also where
+/// two keys for one fact disagree.
 TransformsFile parse_transforms(std::string_view json, const std::string& where);
 
 /// The lens of a photo that is width x height px, a size that counts where the file declares none.

@@ -75,6 +75,7 @@ std::vector<DepthView> render_depth_views(Renderer& renderer, const std::vector<
         DepthView view;
         view.camera = camera;
         view.camera.lens = {};
+        view.camera.shutter = {};
         const ImageF picture = renderer.render(view.camera, glm::vec3(0.0f),
                                                options.colours ? -1 : 0, options.near_plane);
         if (options.colours)

@@ -48,6 +48,7 @@ Sight look_at_scene(Device& device, SplatModel model, std::vector<View> views,
     for (View& view : views) {
         const Camera& c = view.camera;
         view.camera.lens = {};
+        view.camera.shutter = {};
         view.lens = {"PINHOLE", {c.fx, c.fy, c.cx, c.cy}, c.width, c.height};
     }
     EffectPlan plan =
@@ -174,6 +175,7 @@ Camera at_size_of(Camera camera, const Camera& photo) {
     camera.width = photo.width;
     camera.height = photo.height;
     camera.lens = {};
+    camera.shutter = {};
     return camera;
 }
 

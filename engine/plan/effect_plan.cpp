@@ -132,8 +132,13 @@ void apply_plan(const EffectPlan& plan, SplatModel& model) {
 }
 
 void apply_plan(const EffectPlan& plan, std::vector<View>& views) {
-    if (plan.on(EFFECT_LENS)) return;
-    for (View& view : views) view.camera.lens = {};
+    for (View& view : views) {
+        if (!plan.on(EFFECT_LENS)) view.camera.lens = {};
+        if (!plan.on(EFFECT_SHUTTER)) view.camera.shutter = {};
+        // What was asked for may have to be found: training and alignment begin at a still camera.
+        view.camera.shutter.active |=
+            plan.on(EFFECT_SHUTTER) && plan.row(EFFECT_SHUTTER).overridden;
+    }
 }
 
 std::string plan_line(const EffectPlan& plan) {
@@ -244,6 +249,25 @@ EffectRow lens_rule(const std::vector<View>& views) {
                              too_wide)
                : fmt::format("{} of {} photos are distorted and are straightened once, at load{}",
                              distorted, views.size(), too_wide);
+    return row;
+}
+
+EffectRow shutter_rule(const std::vector<View>& views) {
+    EffectRow row;
+    std::size_t rolling = 0;
+    for (const View& view : views) {
+        const Camera& c = view.camera;
+        if (!c.shutter.active) continue;
+        ++rolling;
+        row.measured = std::max(row.measured, std::max(c.fx, c.fy) * glm::length(c.shutter.turn));
+    }
+    row.on = rolling > 0;
+    row.reason = views.empty() ? "no cameras are named"
+                 : row.on      ? fmt::format(
+                                     "the rows of {} of {} photos are exposed one after the other, "
+                                          "while cameras turn by up to {:.1f} px",
+                                     rolling, views.size(), row.measured)
+                          : "no file says that rows are exposed one after the other";
     return row;
 }
 
@@ -461,6 +485,7 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
     plan.row(EFFECT_SURFACE).reason = "of training alone";
     plan.row(EFFECT_OFF_CENTRE) = centre_rule(views);
     plan.row(EFFECT_LENS) = lens_rule(views);
+    plan.row(EFFECT_SHUTTER) = shutter_rule(views);
     plan.row(EFFECT_ALPHA).reason = "of photos alone; pictures are over the background";
     plan.row(EFFECT_DEPTH) = {outputs.depth, false, 0, outputs.depth ? 1.0 : 0.0,
                               outputs.depth ? "depth was asked for" : "no output asks for it"};
@@ -474,7 +499,7 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
     }
     override_rows(choice, plan, model.sh_degree,
                   {EFFECT_ANTIALIAS, EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH, EFFECT_CAMERAS,
-                   EFFECT_SURFACE});
+                   EFFECT_SURFACE, EFFECT_SHUTTER});
     return plan;
 }
 
@@ -489,6 +514,7 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
     plan.row(EFFECT_EXPOSURE) = exposure_rule(dataset, photos);
     plan.row(EFFECT_OFF_CENTRE) = centre_rule(dataset.views);
     plan.row(EFFECT_LENS) = lens_rule(dataset.views);
+    plan.row(EFFECT_SHUTTER) = shutter_rule(dataset.views);
     plan.row(EFFECT_ALPHA) = alpha_rule(dataset, photos);
     plan.row(EFFECT_DEPTH) = depth_rule(dataset.views);
     plan.row(EFFECT_CAMERAS).reason = "off unless it is asked for: --refine-cameras on";
@@ -497,7 +523,8 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
     plan.row(EFFECT_HUGE) = huge_rule();
     plan.row(EFFECT_NEAR) = {true, false, 0, 0,
                              "splats move while they train, beside the cameras too"};
-    override_rows(choice, plan, sh_degree, {EFFECT_DEPTH, EFFECT_CAMERAS, EFFECT_SURFACE});
+    override_rows(choice, plan, sh_degree,
+                  {EFFECT_DEPTH, EFFECT_CAMERAS, EFFECT_SURFACE, EFFECT_SHUTTER});
     if (plan.on(EFFECT_DEPTH) && plan.row(EFFECT_DEPTH).measured == 0)
         throw Error("--effects with depth", "no training photo has a measured depth",
                     "Put depths/NAME.png or .npy beside the photos, or leave +depth out.");

@@ -98,7 +98,8 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
 
 /// The model as the plan wants it: higher bands dropped, the render mode as planned.
 void apply_plan(const EffectPlan& plan, SplatModel& model);
-/// The cameras as the plan wants them: pinholes where lenses are off.
+/// The cameras as the plan wants them: pinholes where lenses are off, and without shutters that
+/// roll where that effect is.
 void apply_plan(const EffectPlan& plan, std::vector<View>& views);
 
 /// One line: the effects that are on, with their reasons.

@@ -26,6 +26,7 @@ struct ProjectionEffects {
     bool antialias = false;  // opacity compensation of the low-pass (SplatRenderMode mip)
     bool smoothing = false;  // the 3D filter of GpuSplats::smoothing()
     bool lens = false;       // Camera::lens
+    bool shutter = false;    // Camera::shutter
     bool near_care = true;   // false: no splat beside a picture reaches into it
 
     bool operator==(const ProjectionEffects&) const = default;
@@ -44,6 +45,7 @@ inline constexpr ProjectionSwitch kProjectionSwitches[] = {
     {&ProjectionEffects::antialias, "ANTIALIAS", EFFECT_ANTIALIAS},
     {&ProjectionEffects::smoothing, "SMOOTHING"},
     {&ProjectionEffects::lens, "LENS", EFFECT_LENS},
+    {&ProjectionEffects::shutter, "SHUTTER", EFFECT_SHUTTER},
     {&ProjectionEffects::near_care, "NEAR_CARE", EFFECT_NEAR},
 };
 

@@ -52,6 +52,8 @@ gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin, floa
     }
     d.ratio_min = glm::vec2(low - margin);
     d.ratio_max = glm::vec2(high + margin);
+    d.shutter_turn = glm::vec3(camera.shutter.turn);
+    d.shutter_move = glm::vec3(camera.shutter.move);
     d.width = static_cast<std::uint32_t>(camera.width);
     d.height = static_cast<std::uint32_t>(camera.height);
     d.tiles_x = tiles_along(d.width);

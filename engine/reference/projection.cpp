@@ -9,6 +9,8 @@
 #include "engine/core/error.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/reference/reference_lens.h"
+#include "engine/scene/pose_metric.h"
+#include "shaders/shared/lens.h"
 
 namespace darb::reference {
 namespace {
@@ -209,8 +211,37 @@ Vec3<T> mean_backward(const Vec3<T>& mean, const CovarianceTerms<T>& terms, cons
     if (!terms.ratio.y_inside) d_uv.y = 0;
     d_uv +=
         glm::transpose(lens_point(camera.lens, free).jacobian) * Vec2<T>(fx * d_px.x, fy * d_px.y);
-    const T scaled = glm::dot(terms.j1, d_j1) + glm::dot(terms.j2, d_j2);  // J scales as 1 / z
+    const T scaled = glm::dot(terms.own1, d_j1) + glm::dot(terms.own2, d_j2);  // scale as 1 / z
     return {d_uv.x / z, d_uv.y / z, -(glm::dot(d_uv, free) + scaled) / z};
+}
+
+/// What the rows of J and the pixel say of the row's time, and of the rows at a given time.
+template <class T>
+struct ShutterGradients {
+    Vec3<T> d_own1{0}, d_own2{0}, d_mean{0}, d_velocity{0};
+    T d_time = 0;  // at a held mean
+};
+
+template <class T>
+ShutterGradients<T> shutter_backward(const CovarianceTerms<T>& terms, const RowCamera<T>& row,
+                                     const Vec3<T>& d_j1, const Vec3<T>& d_j2) {
+    const RowMotion<T>& m = terms.motion;
+    // j1 = own1 + u s own2, j2 = own2 + v s own2, with (u, v) = own . velocity, s = 1 / (H - v).
+    const T by_u = m.per_row * glm::dot(d_j1, terms.own2);
+    const T by_v =
+        m.per_row * glm::dot(d_j2, terms.own2) +
+        m.per_row * m.per_row *
+            (m.pixel.x * glm::dot(d_j1, terms.own2) + m.pixel.y * glm::dot(d_j2, terms.own2));
+    ShutterGradients<T> d;
+    d.d_own1 = d_j1 + by_u * m.velocity;
+    d.d_own2 = d_j2 + m.per_row * (m.pixel.x * d_j1 + m.pixel.y * d_j2) + by_v * m.velocity;
+    d.d_velocity = by_u * terms.own1 + by_v * terms.own2;
+    // velocity = turn x mean - swing, and the rows that turn with the camera are j1 W and j2 W.
+    d.d_mean = glm::cross(d.d_velocity, row.turn);
+    d.d_time = -glm::dot(d.d_velocity, glm::cross(row.turn, row.swing)) -
+               glm::dot(d_j1, glm::cross(row.turn, terms.j1)) -
+               glm::dot(d_j2, glm::cross(row.turn, terms.j2));
+    return d;
 }
 
 /// dL/d(camera). j: rows of the Jacobian by world coordinates, J W, where W is the rotation. d_j:
@@ -219,7 +250,7 @@ template <class T>
 struct CameraInputs {
     Vec3<T> mean{0};      // in the camera
     Vec3<T> position{0};  // world
-    Vec3<T> d_mean{0}, d_j1{0}, d_j2{0}, d_k1{0}, d_k2{0}, d_view{0};
+    Vec3<T> d_mean{0}, d_own1{0}, d_own2{0}, d_k1{0}, d_k2{0}, d_view{0};
     Vec2<T> d_px{0};
 };
 
@@ -235,19 +266,19 @@ CameraGradients<T> camera_backward(const CameraInputs<T>& in, const CovarianceTe
                    glm::outerProduct(t, d_centre);
     const Vec2<T> free(in.mean.x / in.mean.z, in.mean.y / in.mean.z);
     const Vec2<T> value = camera.lens.active ? lens_point(camera.lens, free).value : free;
-    d.d_focal = {in.d_px.x * value.x + glm::dot(in.d_j1, terms.j1) / T(camera.fx),
-                 in.d_px.y * value.y + glm::dot(in.d_j2, terms.j2) / T(camera.fy)};
+    d.d_focal = {in.d_px.x * value.x + glm::dot(in.d_own1, terms.own1) / T(camera.fx),
+                 in.d_px.y * value.y + glm::dot(in.d_own2, terms.own2) / T(camera.fy)};
     d.d_principal = in.d_px;
     if (camera.lens.active) return d;
     // A clamped ratio is that of a corner of the picture, (pixel - c) / f, so f times the ratio in
     // its row does not depend on f, and changes by -c.
     if (!terms.ratio.x_inside) {
-        d.d_focal.x += in.d_j1.z * terms.ratio.x / in.mean.z;
-        d.d_principal.x += in.d_j1.z / in.mean.z;
+        d.d_focal.x += in.d_own1.z * terms.ratio.x / in.mean.z;
+        d.d_principal.x += in.d_own1.z / in.mean.z;
     }
     if (!terms.ratio.y_inside) {
-        d.d_focal.y += in.d_j2.z * terms.ratio.y / in.mean.z;
-        d.d_principal.y += in.d_j2.z / in.mean.z;
+        d.d_focal.y += in.d_own2.z * terms.ratio.y / in.mean.z;
+        d.d_principal.y += in.d_own2.z / in.mean.z;
     }
     return d;
 }
@@ -260,6 +291,8 @@ CameraGradients<T>& CameraGradients<T>::operator+=(const CameraGradients& other)
     d_translation += other.d_translation;
     d_focal += other.d_focal;
     d_principal += other.d_principal;
+    d_turn += other.d_turn;
+    d_move += other.d_move;
     return *this;
 }
 
@@ -308,12 +341,14 @@ void set_shape(const Camera& camera, const RenderSettings& settings,
 }
 
 template <class T>
-ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& camera,
+ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& given,
                           const RenderSettings& settings, const KernelTable& kernel) {
     if (index >= splats.size())
         throw Error("reference", fmt::format("there is no splat {} among {}", index, splats.size()),
                     "Splats count from 0.");
     ProjectedSplat<T> p;
+    const RowCamera<T> row = row_camera(&splats.position[index * 3], given);
+    const Camera& camera = row.camera;
     const Vec3<T> mean = mean_in_camera(&splats.position[index * 3], camera);
     if (!(mean.z > T(settings.near_z)) || !std::isfinite(mean.x + mean.y + mean.z)) {
         p.cull = Cull::near_plane;
@@ -327,7 +362,7 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
     }
     const CovarianceTerms<T> terms =
         covariance_terms(mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index),
-                         camera, settings.low_pass,
+                         row, settings.low_pass,
                          kernel.covariance_scale(static_cast<double>(exponent_of(splats, index))));
     p.exponent = exponent_of(splats, index);
     p.opacity = sigmoid_of_clamped(splats.opacity_logit[index]) * opacity_factor(splats, terms);
@@ -371,7 +406,7 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
 }
 
 template <class T>
-void project_backward(const Splats<T>& splats, size_t index, const Camera& camera,
+void project_backward(const Splats<T>& splats, size_t index, const Camera& given,
                       const RenderSettings& settings, const KernelTable& kernel,
                       const ProjectedPair<T>& projected, SplatGradients<T>& out,
                       CameraGradients<T>* d_camera) {
@@ -379,10 +414,12 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     if (splat.cull != Cull::none) {
         return;
     }
+    const RowCamera<T> row = row_camera(&splats.position[index * 3], given);
+    const Camera& camera = row.camera;
     const Vec3<T> mean = mean_in_camera(&splats.position[index * 3], camera);
     const RotationTerms<T> rotation = rotation_terms(&splats.rotation[index * 4]);
     const CovarianceTerms<T> terms = covariance_terms(
-        mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index), camera,
+        mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index), row,
         settings.low_pass, kernel.covariance_scale(static_cast<double>(splat.exponent)));
     const Mat3<T> view_matrix = view_rotation<T>(camera);
 
@@ -397,18 +434,36 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     const Vec3<T> d_k2 = rotation.matrix * (e2 * terms.scale);
     const Vec3<T> d_j1 = view_matrix * d_k1, d_j2 = view_matrix * d_k2;
 
-    Vec3<T> d_mean = mean_backward(mean, terms, camera, d_j1, d_j2, gradient.d_mean_px);
+    const ShutterGradients<T> d =
+        row.rolls ? shutter_backward(terms, row, d_j1, d_j2) : ShutterGradients<T>{d_j1, d_j2};
+    Vec3<T> d_mean =
+        mean_backward(mean, terms, camera, d.d_own1, d.d_own2, gradient.d_mean_px) + d.d_mean;
     d_mean.z += gradient.d_depth;
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
     const Vec3<T> d_view =
         colour_backward(splats, index, active_degree(splats, settings), view, splat, gradient, out);
+    // The time of the row moves with the splat, and the camera with the time.
+    const RowMotion<T>& motion = terms.motion;
+    const T by_row = motion.per_row * (d.d_time + glm::dot(d_mean, motion.velocity) -
+                                       glm::dot(d_view, row.swing * view_matrix));
+    d_mean += by_row * terms.own2;
     const Vec3<T> d_position = d_mean * view_matrix + d_view;
     if (d_camera) {
         const Vec3<T> position(splats.position[index * 3], splats.position[index * 3 + 1],
                                splats.position[index * 3 + 2]);
-        *d_camera = camera_backward(
-            {mean, position, d_mean, d_j1, d_j2, d_k1, d_k2, d_view, gradient.d_mean_px}, terms,
-            camera);
+        *d_camera = camera_backward({mean, position, d_mean, d.d_own1, d.d_own2, d_k1, d_k2, d_view,
+                                     gradient.d_mean_px + Vec2<T>(0, by_row)},
+                                    terms, camera);
+        const Mat3<T> back(glm::transpose(row.turned));
+        d_camera->d_rotation = back * d_camera->d_rotation;
+        d_camera->d_translation = back * d_camera->d_translation;
+        // A turn of the row's camera on the left, and the shutter's terms in the velocity.
+        const Vec3<T> twist = glm::cross(mean, d_mean) + glm::cross(d_j1, terms.j1) +
+                              glm::cross(d_j2, terms.j2) - glm::cross(row.swing, d.d_velocity);
+        const Mat3<T> jacobian(left_jacobian(double(row.time) * glm::dvec3(row.turn)));
+        d_camera->d_turn =
+            row.time * (glm::transpose(jacobian) * twist) + glm::cross(mean, d.d_velocity);
+        d_camera->d_move = -(back * (row.time * (d_mean + view_matrix * d_view) + d.d_velocity));
     }
 
     for (int c = 0; c < 3; ++c) {
@@ -528,20 +583,74 @@ T row_shrink(const Vec3<T>& r1, const Vec3<T>& r2) {
     return longest > T(ROW_LIMIT) ? std::ldexp(T(1), -std::ilogb(longest)) : T(1);
 }
 
+/// The pixel of a point in the camera, whether or not the lens sees it.
 template <class T>
-CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
-                                    const T* log_scale, T filter, const Camera& camera,
-                                    double low_pass, double covariance_scale) {
-    CovarianceTerms<T> c;
+Vec2<T> pixel_at(const Vec3<T>& mean, const Camera& camera) {
+    const Vec2<T> ray(mean.x / mean.z, mean.y / mean.z);
+    const Vec2<T> value = camera.lens.active ? lens_point(camera.lens, ray).value : ray;
+    return Vec2<T>(camera.fx, camera.fy) * value + Vec2<T>(camera.cx, camera.cy);
+}
+
+template <class T>
+void set_rows(const Vec3<T>& mean_camera, const Camera& camera, CovarianceTerms<T>& c) {
     c.ratio = ratio_terms(mean_camera, camera);
     const T fx = T(camera.fx), fy = T(camera.fy), z = mean_camera.z;
-    c.j1 = {fx / z, 0, -fx * c.ratio.x / z};
-    c.j2 = {0, fy / z, -fy * c.ratio.y / z};
+    c.own1 = {fx / z, 0, -fx * c.ratio.x / z};
+    c.own2 = {0, fy / z, -fy * c.ratio.y / z};
     if (camera.lens.active) {
         const Vec3<T> along_x(1 / z, 0, -c.ratio.x / z), along_y(0, 1 / z, -c.ratio.y / z);
         const Mat2<T> d = lens_point(camera.lens, Vec2<T>(c.ratio.x, c.ratio.y)).jacobian;
-        c.j1 = fx * (d[0][0] * along_x + d[1][0] * along_y);
-        c.j2 = fy * (d[0][1] * along_x + d[1][1] * along_y);
+        c.own1 = fx * (d[0][0] * along_x + d[1][0] * along_y);
+        c.own2 = fy * (d[0][1] * along_x + d[1][1] * along_y);
+    }
+}
+
+template <class T>
+void set_motion(const Vec3<T>& mean_camera, const RowCamera<T>& row, CovarianceTerms<T>& c) {
+    c.motion.velocity = glm::cross(row.turn, mean_camera) - row.swing;
+    c.motion.pixel = {glm::dot(c.own1, c.motion.velocity), glm::dot(c.own2, c.motion.velocity)};
+    const T rows = T(row.camera.height);
+    if (std::abs(row.time) < T(SHUTTER_LONGEST))
+        c.motion.per_row = 1 / std::max(rows - c.motion.pixel.y, T(SHUTTER_SLOWEST) * rows);
+}
+
+template <class T>
+RowCamera<T> row_camera(const T* position, const Camera& camera) {
+    RowCamera<T> row;
+    row.camera = camera;
+    row.rolls = camera.shutter.active;
+    if (!row.rolls) return row;
+    constexpr int kSteps = 30;  // the shader makes SHUTTER_STEPS of Newton's
+    row.turn = Vec3<T>(camera.shutter.turn);
+    for (int step = 0;; ++step) {
+        row.camera = camera_at_row(camera, double(row.time));
+        row.turned = exp_rotation(double(row.time) * camera.shutter.turn);
+        row.swing = Vec3<T>(row.turned * camera.shutter.move);
+        if (step == kSteps) return row;
+        const Vec3<T> mean = mean_in_camera(position, row.camera);
+        CovarianceTerms<T> c;
+        set_rows(mean, row.camera, c);
+        set_motion(mean, row, c);
+        const T rows = T(camera.height);
+        const T miss = pixel_at(mean, row.camera).y - rows * (T(0.5) + row.time);
+        const T slope = std::max(rows - c.motion.pixel.y, T(SHUTTER_SLOWEST) * rows);
+        row.time = std::clamp(row.time + miss / slope, -T(SHUTTER_LONGEST), T(SHUTTER_LONGEST));
+    }
+}
+
+template <class T>
+CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
+                                    const T* log_scale, T filter, const RowCamera<T>& row,
+                                    double low_pass, double covariance_scale) {
+    CovarianceTerms<T> c;
+    const Camera& camera = row.camera;
+    set_rows(mean_camera, camera, c);
+    c.j1 = c.own1;
+    c.j2 = c.own2;
+    if (row.rolls) {
+        set_motion(mean_camera, row, c);
+        c.j1 += c.motion.pixel.x * c.motion.per_row * c.own2;
+        c.j2 += c.motion.pixel.y * c.motion.per_row * c.own2;
     }
     const Mat3<T> view = view_rotation<T>(camera);
     c.k1 = c.j1 * view;
@@ -560,16 +669,18 @@ CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTe
     return c;
 }
 
-#define DARB_INSTANTIATE(T)                                                               \
-    template RotationTerms<T> rotation_terms(const T*);                                   \
-    template Vec4<T> rotation_backward(const RotationTerms<T>&, const Mat3<T>&);          \
-    template RatioTerms<T> ratio_terms(const Vec3<T>&, const Camera&);                    \
-    template T clamped_scale(T);                                                          \
-    template SmoothedScale<T> smoothed_scale(const T*, T);                                \
-    template Mat3<T> view_rotation(const Camera&);                                        \
-    template Vec3<T> mean_in_camera(const T*, const Camera&);                             \
-    template CovarianceTerms<T> covariance_terms(const Vec3<T>&, const RotationTerms<T>&, \
-                                                 const T*, T, const Camera&, double, double);
+#define DARB_INSTANTIATE(T)                                                                \
+    template RotationTerms<T> rotation_terms(const T*);                                    \
+    template Vec4<T> rotation_backward(const RotationTerms<T>&, const Mat3<T>&);           \
+    template RatioTerms<T> ratio_terms(const Vec3<T>&, const Camera&);                     \
+    template T clamped_scale(T);                                                           \
+    template SmoothedScale<T> smoothed_scale(const T*, T);                                 \
+    template Mat3<T> view_rotation(const Camera&);                                         \
+    template Vec3<T> mean_in_camera(const T*, const Camera&);                              \
+    template RowCamera<T> row_camera(const T*, const Camera&);                             \
+    template CovarianceTerms<T> covariance_terms(const Vec3<T>&, const RotationTerms<T>&,  \
+                                                 const T*, T, const RowCamera<T>&, double, \
+                                                 double);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 #undef DARB_INSTANTIATE

@@ -60,12 +60,14 @@ struct SplatGradients : SplatArrays<T> {
 };
 
 /// dL/d(camera): by the twelve numbers of p_camera = rotation * p_world + translation, each treated
-/// as free, and by focal lengths and principal point. The terms of a lens are constant.
+/// as free, by focal lengths and principal point, and by a shutter. The terms of a lens are
+/// constant.
 template <class T>
 struct CameraGradients {
     Mat3<T> d_rotation{T(0)};  // as Camera::rotation: column, then row
     Vec3<T> d_translation{0};
     Vec2<T> d_focal{0}, d_principal{0};  // 1/px
+    Vec3<T> d_turn{0}, d_move{0};        // of the shutter
     CameraGradients& operator+=(const CameraGradients& other);
 };
 
@@ -132,10 +134,32 @@ struct SmoothedScale {
 template <class T>
 SmoothedScale<T> smoothed_scale(const T* log_scale, T filter);
 
+/// The camera as it was when the row of a splat was exposed; without a rolling shutter, itself.
+template <class T>
+struct RowCamera {
+    Camera camera;  // its shutter has been dropped
+    bool rolls = false;
+    T time = 0;                 // of the row, as in engine/scene/camera.h
+    Vec3<T> turn{0}, swing{0};  // its turn, and exp(time turn) move
+    glm::dmat3 turned{1.0};     // exp(time turn)
+};
+template <class T>
+RowCamera<T> row_camera(const T* position, const Camera& camera);
+
+/// How a splat's centre moves in the picture while rows are exposed.
+template <class T>
+struct RowMotion {
+    Vec3<T> velocity{0};  // of the mean in the camera, by the time
+    Vec2<T> pixel{0};     // px, by the time
+    T per_row = 0;        // the time by the row, 1/px; 0 where it is held
+};
+
 template <class T>
 struct CovarianceTerms {
     RatioTerms<T> ratio;
-    Vec3<T> j1{0}, j2{0};  // rows of the Jacobian J, px per world unit
+    Vec3<T> own1{0}, own2{0};  // rows of the Jacobian of the pixel at a given time
+    RowMotion<T> motion;
+    Vec3<T> j1{0}, j2{0};  // those with the row's time free, J; px per world unit
     Vec3<T> k1{0}, k2{0};  // rows of J W
     SmoothedScale<T> smooth;
     Vec3<T> scale{0};      // standard deviations, filter included, world units
@@ -156,7 +180,7 @@ Vec3<T> mean_in_camera(const T* position, const Camera& camera);
 
 template <class T>
 CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
-                                    const T* log_scale, T filter, const Camera& camera,
+                                    const T* log_scale, T filter, const RowCamera<T>& row,
                                     double low_pass, double covariance_scale);
 
 // Real spherical harmonics of degree 0 to 3 in the order and with the signs of 3DGS: the basis and

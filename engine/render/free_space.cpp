@@ -26,6 +26,7 @@ std::vector<Camera> evenly_chosen(const std::vector<Camera>& cameras, std::size_
 
 Camera pinhole_at_most(Camera camera, int width) {
     camera.lens = {};
+    camera.shutter = {};
     if (camera.width <= width) return camera;
     return resized(camera, width, std::max(1, camera.height * width / camera.width));
 }

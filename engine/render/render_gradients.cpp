@@ -50,6 +50,12 @@ CameraGradient camera_gradient(const Camera& camera, const CameraTotals& sum) {
     g.d_fy = sum[10];
     g.d_cx = sum[11];
     g.d_cy = sum[12];
+    for (int c = 0; c < 3; ++c) {
+        const auto at =
+            static_cast<std::size_t>(CAMERA_SHARE_SHUTTER) + static_cast<std::size_t>(c);
+        g.d_turn[c] = sum[at];
+        g.d_move[c] = sum[at + 3];
+    }
     return g;
 }
 
@@ -84,7 +90,8 @@ void check_camera(const Camera& camera, const glm::vec3& background) {
                     "A picture has pixels and positive focal lengths.");
 }
 
-ForwardOptions options_of(const SplatModel& model, const GradientOptions& asked, bool lens) {
+ForwardOptions options_of(const SplatModel& model, const GradientOptions& asked,
+                          const Camera& camera) {
     if (asked.direct_colour && model.sh_degree > 0)
         throw Error(
             "splat model",
@@ -95,7 +102,8 @@ ForwardOptions options_of(const SplatModel& model, const GradientOptions& asked,
                     "Render at full size.");
     ForwardOptions options = frame_accuracy(asked.accuracy, model).options;
     options.store_for_backward = true;
-    options.effects.lens = lens;
+    options.effects.lens = camera.lens.active;
+    options.effects.shutter = camera.shutter.active;
     options.linear_values = asked.linear_values;
     options.direct_colour = asked.direct_colour;
     options.alpha_gradient = true;
@@ -157,7 +165,7 @@ struct GradientRenderer::State {
     FrameExchange exchange;
     Commands commands;
     GradientBuffers gradients;
-    std::optional<ForwardOptions> drawn_with;  // with or without a lens, like the last camera
+    std::optional<ForwardOptions> drawn_with;  // with lens and shutter as the last camera
     std::optional<FrameBuffers> buffers;
     std::optional<Forward> forward;
     std::optional<Backward> backward;
@@ -175,7 +183,7 @@ struct GradientRenderer::State {
           exchange(on),
           commands(on),
           gradients(on, splats) {
-        options_of(model, asked, false);
+        options_of(model, asked, {});
         header.kernel = model.kernel;
         header.footprint = model.footprint;
         header.antialias = model.antialias;
@@ -231,7 +239,7 @@ void GradientRenderer::replace(const SplatModel& model) {
         throw Error("splat model",
                     "has another kernel, footprint or anti-aliasing than the one on the device",
                     "Make another GradientRenderer for it.");
-    options_of(model, s.options, false);
+    options_of(model, s.options, {});
     if (s.holds_same(model)) return s.upload(model);
     s.image = {};
     s.splats = GpuSplats(s.device, model, false);
@@ -345,8 +353,9 @@ const ImageF& GradientRenderer::render(const Camera& camera, const glm::vec3& ba
     check_frame(s.device, camera.width, camera.height, "camera");
     s.image = {};
     s.camera = camera;
-    if (!s.drawn_with || s.drawn_with->effects.lens != camera.lens.active) {
-        s.drawn_with = options_of(s.header, s.options, camera.lens.active);
+    if (!s.drawn_with || s.drawn_with->effects.lens != camera.lens.active ||
+        s.drawn_with->effects.shutter != camera.shutter.active) {
+        s.drawn_with = options_of(s.header, s.options, camera);
         s.buffers.emplace(s.device, *s.drawn_with);
         s.forward.emplace(s.device, *s.drawn_with);
         s.backward.emplace(s.device, *s.drawn_with);
@@ -449,8 +458,9 @@ ViewGradients GradientRenderer::backward(const ImageF& d_image, const ImageF& d_
     view.d_camera = camera_gradient(s.camera, shares, view.d.position);
     view.d_mean.reserve(2 * n);  // moves with the principal point
     for (size_t i = 0; i < n; ++i)
-        view.d_mean.insert(view.d_mean.end(), {shares[CAMERA_SHARES * i + CAMERA_SHARES - 2],
-                                               shares[CAMERA_SHARES * i + CAMERA_SHARES - 1]});
+        view.d_mean.insert(view.d_mean.end(),
+                           {shares[CAMERA_SHARES * i + CAMERA_SHARE_CENTRE],
+                            shares[CAMERA_SHARES * i + CAMERA_SHARE_CENTRE + 1]});
     return view;
 }
 

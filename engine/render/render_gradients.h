@@ -32,6 +32,7 @@ struct CameraGradient {
     glm::dmat3 d_rotation{0.0};  // as Camera::rotation: column, then row
     glm::dvec3 d_translation{0.0};
     double d_fx = 0, d_fy = 0, d_cx = 0, d_cy = 0;  // 1/px
+    glm::dvec3 d_turn{0.0}, d_move{0.0};            // of the shutter
 };
 
 /// Sums over the splats, in the order of shaders/shared/optim_args.h.

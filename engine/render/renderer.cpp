@@ -137,6 +137,9 @@ const Buffer& Renderer::draw(const Camera& camera, const glm::vec3& background, 
     if (camera.lens.active && !forward_.options().effects.lens)
         throw Error("render", "the camera has a lens, but the effect is off",
                     "Turn ProjectionEffects::lens on, or drop the camera's lens.");
+    if (camera.shutter.active && !forward_.options().effects.shutter)
+        throw Error("render", "the camera's shutter rolls, but the effect is off",
+                    "Turn ProjectionEffects::shutter on, or drop the camera's shutter.");
     const int degree =
         sh_degree < 0 ? accuracy_.sh_degree : std::min(sh_degree, accuracy_.sh_degree);
     const Buffer* image = nullptr;
@@ -150,6 +153,7 @@ const Buffer& Renderer::draw(const Camera& camera, const glm::vec3& background, 
 
 void Renderer::list(const Camera& camera, float near_plane) {
     DARB_CHECK(!camera.lens.active || forward_.options().effects.lens);
+    DARB_CHECK(!camera.shutter.active || forward_.options().effects.shutter);
     run_frame(camera, glm::vec3(0.0f), 0, near_plane, [&](Frame& frame) {
         forward_.record_intersections(commands_, splats_, view_, frame);
     });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Camera: a pinhole with its pose, in double, and optionally a lens before it, for pictures that
-// are to be distorted like the photo. Frame: x right, y down, z forward (COLMAP's). The centre of
-// the top left pixel is at (0.5, 0.5).
+// are to be distorted like the photo, and a shutter that rolls. Frame: x right, y down, z forward
+// (COLMAP's). The centre of the top left pixel is at (0.5, 0.5).
 #pragma once
 
 #include <array>
@@ -26,6 +26,16 @@ struct LensTerms {
     glm::dvec2 ray_min{0.0}, ray_max{0.0};  // bounds of the rays of the frame
 };
 
+/// A rolling shutter: the rows of a picture are exposed one after the other while the camera moves.
+/// At the time t of a row, -1/2 at the top edge and 1/2 at the bottom, with p the pose of the
+/// middle row,
+///   p_camera(t) = exp(t turn) (p_camera - t move).
+struct ShutterTerms {
+    bool active = false;   // false: all rows at once
+    glm::dvec3 turn{0.0};  // rad over the read-out, axis in the camera of the middle row
+    glm::dvec3 move{0.0};  // of the centre over the read-out, in that camera; world units
+};
+
 struct Camera {
     int width = 0;                          // px
     int height = 0;                         // px
@@ -33,6 +43,7 @@ struct Camera {
     glm::dmat3 rotation{1.0};  // world to camera: p_camera = rotation * p_world + translation
     glm::dvec3 translation{0.0};
     LensTerms lens{};
+    ShutterTerms shutter{};
 
     glm::dvec3 centre() const { return -(glm::transpose(rotation) * translation); }
 };

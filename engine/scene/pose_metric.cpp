@@ -65,6 +65,16 @@ Camera moved_camera(const Camera& camera, const PoseVector& step) {
     return moved;
 }
 
+Camera camera_at_row(const Camera& camera, double time) {
+    Camera row = camera;
+    row.shutter = {};
+    if (!camera.shutter.active) return row;
+    const glm::dmat3 turn = exp_rotation(time * camera.shutter.turn);
+    row.rotation = turn * camera.rotation;
+    row.translation = turn * (camera.translation - time * camera.shutter.move);
+    return row;
+}
+
 std::array<PoseVector, 2> pixel_by_pose(const Camera& camera, const glm::dvec3& p) {
     const std::array<glm::dvec3, 2> rows{
         glm::dvec3(camera.fx / p.z, 0, -camera.fx * p.x / (p.z * p.z)),

@@ -24,6 +24,9 @@ Camera moved_camera(const Camera& camera, const PoseVector& step);
 glm::dmat3 exp_rotation(const glm::dvec3& v);
 glm::dmat3 left_jacobian(const glm::dvec3& v);
 
+/// The camera at a row's time, -1/2 to 1/2: as Camera::shutter says, and without a shutter itself.
+Camera camera_at_row(const Camera& camera, double time);
+
 /// Derivatives of a pinhole's pixel by turn and move, at the point p in camera space.
 std::array<PoseVector, 2> pixel_by_pose(const Camera& camera, const glm::dvec3& p);
 

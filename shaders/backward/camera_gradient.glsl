@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // dL/d(camera) of one splat, with respect to the numbers that project.comp computes with, each of them free: the
-// rotation's nine entries by rows with the centre held, then fx, fy, cx, cy. Used with CAMERA_GRADIENT;
-// camera_sums.comp or the host adds the splats up, and the effect of the centre is in dL/d(position). A lens keeps its
-// own terms. Needs camera_model.glsl.
+// rotation's nine entries by rows with the centre held, then fx, fy, cx, cy, and the shutter's turn and move. Used with
+// CAMERA_GRADIENT; camera_sums.comp or the host adds the splats up, and the effect of the centre is in dL/d(position).
+// A lens keeps its own terms. Needs camera_model.glsl and shutter.glsl.
 
 layout(constant_id = 30) const int CAMERA_GRADIENT = 0;
 
@@ -33,6 +33,33 @@ void store_camera_gradient(CameraData camera, uint i, vec3 p, vec3 to_splat, vec
     camera_gradient[at + 10u] = of_y.x;
     camera_gradient[at + 11u] = of_x.y;
     camera_gradient[at + 12u] = of_y.y;
+    if (SHUTTER == 0)
+        for (uint c = CAMERA_SHARE_SHUTTER; c < CAMERA_SHARES; ++c) camera_gradient[at + c] = 0.0;
+}
+
+// twist: dL/d(a turn of the row's camera, on the left).
+void store_shutter_gradient(CameraData camera, uint i, float time, vec3 p, vec3 d_p, vec3 twist, vec3 d_view,
+                            ShutterMotion m, ShutterGradient g) {
+    const vec3 angle = time * camera.shutter_turn;
+    const vec3 d_turn = time * left_jacobian_transposed(twist - cross(m.swing, g.d_velocity), angle) +
+                        cross(p, g.d_velocity);
+    const vec3 d_move = -turned(time * (d_p + to_camera(camera, d_view)) + g.d_velocity, -angle);
+    const uint at = CAMERA_SHARES * i + CAMERA_SHARE_SHUTTER;
+    for (uint c = 0u; c < 3u; ++c) {
+        camera_gradient[at + c] = d_turn[c];
+        camera_gradient[at + 3u + c] = d_move[c];
+    }
+}
+
+// From the rotation of the row at this time to that of the middle row, whose `move` the centre of the row follows, too.
+// d_view: dL/d(position) through the view direction.
+void turn_back_camera_gradient(CameraData camera, uint i, float time, vec3 d_view) {
+    const uint at = CAMERA_SHARES * i;
+    for (uint c = 0u; c < 3u; ++c) {
+        const vec3 column = vec3(camera_gradient[at + c], camera_gradient[at + 3u + c], camera_gradient[at + 6u + c]);
+        const vec3 middle = turned(column, -time * camera.shutter_turn) - time * d_view[c] * camera.shutter_move;
+        for (uint k = 0u; k < 3u; ++k) camera_gradient[at + 3u * k + c] = middle[k];
+    }
 }
 
 void clear_camera_gradient(uint i) {

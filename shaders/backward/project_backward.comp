@@ -63,7 +63,7 @@ layout(set = 0, binding = FRAME_BINDING + 9, scalar) buffer Status { FrameStatus
 layout(set = 0, binding = FRAME_BINDING + 10, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world
 // as sh_rest; not with REST_EACH
 layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer RestSum { vec4 rest_sum[]; };
-layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer CameraGradient { float camera_gradient[]; };  // [N][13] with CAMERA_GRADIENT
+layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer CameraGradient { float camera_gradient[]; };  // [N][CAMERA_SHARES] with CAMERA_GRADIENT
 layout(set = 0, binding = FRAME_BINDING + 12, scalar) readonly buffer PartialExponent { float partial_exponent[]; };  // with SHAPED
 
 #define PARTIALS_BINDING (FRAME_BINDING + 2)
@@ -74,6 +74,7 @@ layout(set = 0, binding = FRAME_BINDING + 12, scalar) readonly buffer PartialExp
 #include "lib/depth_sum.glsl"
 #include "effects/antialias.glsl"
 #include "effects/camera_model.glsl"
+#include "effects/shutter.glsl"
 #include "lib/linear_id.glsl"
 #include "lib/partials.glsl"
 #include "lib/sh.glsl"

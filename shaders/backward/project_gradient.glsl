@@ -65,6 +65,9 @@ vec3 outside_is_zero(vec3 gradient, vec3 value, float limit) {
 
 SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     SplatGradient g;
+    const vec3 centre_rest = camera.centre_rest;
+    float time = 0.0;
+    if (SHUTTER == 1) time = take_row(camera, position[i]);
     const vec3 to_splat = from_centre(camera, position[i]);
     const vec3 p = to_camera(camera, to_splat);
     const vec3 raw_scale = log_scale[i];
@@ -80,6 +83,12 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     normalise_rotation(rotation[i], unit, norm);
     vec3 j0, j1;
     jacobian_rows(camera, p, j0, j1);
+    const mat2x3 k = mat2x3(j0, j1);
+    ShutterMotion motion;
+    if (SHUTTER == 1) {
+        motion = shutter_motion(camera, time, p, j0, j1);
+        add_shutter(motion, j0, j1);
+    }
     const mat3 axes = rotation_matrix(unit);
     const vec3 t0 = to_world(camera, j0), t1 = to_world(camera, j1);
     const vec3 r1 = (t0 * axes) * s, r2 = (t1 * axes) * s;
@@ -105,9 +114,12 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     g.rotation = (d_unit - unit * dot(unit, d_unit)) / norm;
 
     const vec3 d_j0 = to_camera(camera, axes * e1), d_j1 = to_camera(camera, axes * e2);
-    vec3 d_p = camera_point_gradient(camera, p, d_j0, d_j1, g.mean);
+    ShutterGradient by_shutter;
+    vec3 d_p = SHUTTER == 1 ? shutter_point_gradient(camera, motion, p, k, mat2x3(j0, j1), mat2x3(d_j0, d_j1), g.mean,
+                                                     by_shutter)
+                            : camera_point_gradient(camera, p, d_j0, d_j1, g.mean);
     if (DEPTH_SUM == 1) d_p.z += sums.d_depth;
-    if (CAMERA_GRADIENT == 1)
+    if (CAMERA_GRADIENT == 1 && SHUTTER == 0)
         store_camera_gradient(camera, i, p, to_splat, d_p, mat2x3(j0, j1), mat2x3(axes * e1, axes * e2),
                               mat2x3(d_j0, d_j1), g.mean);
     g.position = to_world(camera, d_p);
@@ -129,12 +141,31 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
             if (4 * t + k < SH_USED) coefficient[4 * t + k] = four[k];
     }
     for (int k = 0; k < SH_USED; ++k) colour += basis[k] * coefficient[k];
+    vec3 d_view = vec3(0.0);  // dL/d(position) through the direction
     g.colour = sums.d_colour;
     if (DIRECT_COLOUR == 0) g.colour = mix(g.colour, vec3(0.0), lessThan(colour, vec3(0.0)));
     if (SH_DEGREE > 0) {
         for (int k = 0; k < SH_USED; ++k) along[k] = dot(g.colour, coefficient[k]);
         const vec3 d = sh_direction_gradient(g.direction, along);
-        g.position += (d - g.direction * dot(g.direction, d)) / range;
+        d_view = (d - g.direction * dot(g.direction, d)) / range;
+        g.position += d_view;
+    }
+    if (SHUTTER == 1) {  // the time of the row moves with the splat
+        const float d_time = by_shutter.d_time + dot(d_p, motion.velocity) -
+                             dot(d_view, to_world(camera, motion.swing));
+        const float by_row = d_time * motion.per_row;
+        g.position += to_world(camera, by_row * k[1]);
+        d_p += by_row * k[1];
+        if (CAMERA_GRADIENT == 1) {
+            const vec2 shear = motion.per_row * motion.pixel;
+            const mat2x3 d_t = mat2x3(axes * e1, axes * (e2 + shear.x * e1 + shear.y * e2));
+            const vec3 twist = cross(p, d_p) + cross(d_j0, j0) + cross(d_j1, j1);
+            store_shutter_gradient(camera, i, time, p, d_p, twist, d_view, motion, by_shutter);
+            camera.centre_rest = centre_rest;
+            store_camera_gradient(camera, i, p, from_centre(camera, position[i]), d_p, k, d_t, by_shutter.d_k,
+                                  g.mean + vec2(0.0, by_row));
+            turn_back_camera_gradient(camera, i, time, d_view);
+        }
     }
     return g;
 }

@@ -27,6 +27,7 @@ layout(constant_id = 2) const int SH_STORED = 0;   // degree of the buffer's lay
 #include "lib/depth.glsl"
 #include "effects/antialias.glsl"
 #include "effects/camera_model.glsl"
+#include "effects/shutter.glsl"
 
 #define FRAME_BINDING (1 + ATTRIBUTES)
 layout(push_constant, scalar) uniform Push { ProjectArgs args; };
@@ -121,7 +122,9 @@ uint find_cover(CameraData camera, vec2 mean, Factor f, float reach, out TileCov
 
 // Returns the number of intersections, or 0 and the reason.
 uint project(uint i, out int reason) {
-    const CameraData camera = cameras[args.camera_index];
+    CameraData camera = cameras[args.camera_index];
+    float time = 0.0;
+    if (SHUTTER == 1) time = take_row(camera, position[i]);
     const vec3 to_splat = from_centre(camera, position[i]);
     const vec3 p = to_camera(camera, to_splat);
     reason = CULL_NEAR;
@@ -150,6 +153,7 @@ uint project(uint i, out int reason) {
     s *= sqrt(kernel_covariance_scale(exponent));
     vec3 j0, j1;
     jacobian_rows(camera, p, j0, j1);
+    if (SHUTTER == 1) add_shutter(shutter_motion(camera, time, p, j0, j1), j0, j1);
     const mat3 axes = rotation_matrix(unit);
     const vec3 r1 = (to_world(camera, j0) * axes) * s;
     const vec3 r2 = (to_world(camera, j1) * axes) * s;

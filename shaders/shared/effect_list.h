@@ -15,13 +15,14 @@
 #define EFFECT_NEAR 8      // splats beside the picture that reach into it; the Jacobian is clamped
 #define EFFECT_CAMERAS 9   // poses and intrinsics are trained beside the splats
 #define EFFECT_SURFACE 10  // terms of the loss that lay splats on surfaces
-#define EFFECT_COUNT 11
+#define EFFECT_SHUTTER 11  // rows of a photo that are exposed one after the other
+#define EFFECT_COUNT 12
 
 #ifdef __cplusplus
 // Their names on the command line and in files, in the order of the numbers.
 #define EFFECT_NAMES                                                                       \
     "sh", "antialias", "exposure", "off_centre", "lens", "alpha", "depth", "huge", "near", \
-        "cameras", "surface"
+        "cameras", "surface", "shutter"
 #endif
 
 #endif

@@ -68,9 +68,11 @@ struct FadeNearArgs {
 };
 
 // dL/d(camera) of a splat: the rotation's nine entries by rows with the centre held, then fx, fy,
-// cx, cy. A sum over splats also has dL/d(position).
-#define CAMERA_SHARES 13u
-#define CAMERA_SUMS 16u
+// cx, cy, and the shutter's turn and move. A sum over splats also has dL/d(position).
+#define CAMERA_SHARES 19u
+#define CAMERA_SHARE_CENTRE 11u  // of cx
+#define CAMERA_SHARE_SHUTTER 13u
+#define CAMERA_SUMS 22u
 #define CAMERA_SUM_THREADS 64u
 #define CAMERA_SUM_GROUPS 256u  // at most
 struct CameraSumArgs {

@@ -92,6 +92,9 @@ struct CameraData {
     vec2 lens_prism;
     vec2 lens_front;
     float lens_fold;
+    // Those of its shutter, read where that effect is on.
+    vec3 shutter_turn;
+    vec3 shutter_move;
 };
 
 // The counts of one frame, written by the passes, read by later passes and afterwards by the host.
@@ -156,7 +159,7 @@ struct UpsampleArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(CameraData) == 168);
+static_assert(sizeof(CameraData) == 192);
 static_assert(sizeof(FrameStatus) == 56);
 static_assert(sizeof(FrameGroups) == 24);
 }  // namespace darb::gpu

@@ -21,8 +21,8 @@
 namespace darb::test {
 namespace {
 
-/// A camera moved along one of its ten degrees of freedom: turned about an axis of its own, moved,
-/// or with another number of the pinhole.
+/// A camera moved along one of its degrees of freedom: turned about an axis of its own, moved, or
+/// with another number of the pinhole or of the shutter.
 Camera moved(Camera camera, int which, double h) {
     if (which < 3) {
         glm::dvec3 axis(0.0);
@@ -32,9 +32,11 @@ Camera moved(Camera camera, int which, double h) {
         camera.translation = turn * camera.translation;
     } else if (which < 6) {
         camera.translation[which - 3] += h;
-    } else {
+    } else if (which < 10) {
         double* const numbers[] = {&camera.fx, &camera.fy, &camera.cx, &camera.cy};
         *numbers[which - 6] += h;
+    } else {
+        (which < 13 ? camera.shutter.turn : camera.shutter.move)[(which - 10) % 3] += h;
     }
     return camera;
 }
@@ -75,7 +77,7 @@ void compare_differences(const TestScene& scene) {
     const std::vector<double> exact = exact_gradient(scene);
     const auto splats = reference::make_splats<double>(scene.model);
     int compared = 0;
-    for (int which = 0; which < kFreedoms; ++which) {
+    for (int which = 0; which < freedoms(scene.camera); ++which) {
         const double h = 1e-6;
         const auto above =
             reference::render(splats, moved(scene.camera, which, h), truth_settings());
@@ -86,7 +88,7 @@ void compare_differences(const TestScene& scene) {
         const double difference = (loss.of(above) - loss.of(below)) / (2 * h);
         EXPECT_NEAR(exact[size_t(which)], difference, 1e-5 * std::abs(difference) + 1e-5) << which;
     }
-    EXPECT_GE(compared, kFreedoms / 2);
+    EXPECT_GE(compared, freedoms(scene.camera) / 2);
 }
 
 void compare_device(const TestScene& scene) {
@@ -99,10 +101,13 @@ void compare_device(const TestScene& scene) {
     ASSERT_GT(view.status.visible, 3u);
     const std::vector<double> exact = exact_gradient(scene);
     const std::vector<double> got = along_all(*view.d_camera, scene.camera);
-    for (const auto& [name, begin, end] : {std::tuple{"turns", 0, 3},
-                                           {"translation", 3, 6},
-                                           {"focal lengths", 6, 8},
-                                           {"principal point", 8, 10}})
+    std::vector<std::tuple<const char*, int, int>> parts{{"turns", 0, 3},
+                                                         {"translation", 3, 6},
+                                                         {"focal lengths", 6, 8},
+                                                         {"principal point", 8, 10}};
+    if (scene.camera.shutter.active)
+        parts.insert(parts.end(), {{"shutter's turn", 10, 13}, {"shutter's move", 13, 16}});
+    for (const auto& [name, begin, end] : parts)
         EXPECT_TRUE(compare_scaled(name, std::vector(exact.begin() + begin, exact.begin() + end),
                                    std::vector(got.begin() + begin, got.begin() + end),
                                    tolerance("gradient_scaled_float32")));
@@ -131,6 +136,16 @@ TEST(CameraGradient, of_the_reference_is_its_differences_with_every_kernel) {
 TEST(CameraGradient, of_the_device_is_that_of_the_reference) {
     compare_device(scene_of(KERNEL_GAUSSIAN, Footprint::psi));
     compare_device(scene_of(KERNEL_BETA, Footprint::exact));
+}
+
+TEST(CameraGradient, of_a_rolling_shutter_is_its_differences_and_the_devices) {
+    for (const double fast : {1.0, 5.0}) {
+        TestScene scene = scene_of(KERNEL_GAUSSIAN, Footprint::psi);
+        scene.camera.shutter = {true, fast * glm::dvec3(0.02, -0.03, 0.02),
+                                fast * glm::dvec3(0.03, 0.02, -0.03)};
+        compare_differences(scene);
+        compare_device(scene);
+    }
 }
 
 TEST(CameraGradient, of_the_device_is_that_of_the_reference_with_every_kernel_long) {

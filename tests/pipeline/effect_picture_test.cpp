@@ -119,6 +119,12 @@ TEST(EffectPicture, lens) {
     });
 }
 
+TEST(EffectPicture, shutter) {
+    expect_right_on_both(EFFECT_SHUTTER, [](Scene& s) {
+        s.camera().shutter = {true, {0.02, -0.03, 0.02}, {0.03, 0.02, -0.03}};
+    });
+}
+
 TEST(EffectPicture, huge_splats_and_long_lists) {
     expect_right_on_both(EFFECT_HUGE, [](Scene& s) {
         Camera& c = s.camera();  // more tiles, and a few splats over all of them

@@ -156,11 +156,23 @@ TEST(ProjectionEffects, every_lens_matches_double) {
         }
 }
 
+TEST(ProjectionEffects, shutter_matches_double) {
+    for (const double fast : {1.0, 8.0}) {
+        TestScene s = scene_for(KERNEL_GAUSSIAN, Footprint::psi, 0.8);
+        s.camera.shutter = {true, fast * glm::dvec3(0.01, -0.02, 0.015),
+                            fast * glm::dvec3(0.02, -0.01, 0.03)};
+        EXPECT_GT(expect_walks_match(s, {.shutter = true}), 60u);
+    }
+}
+
 TEST(ProjectionEffects, all_at_once_match_double) {
     TestScene s = scene_for(KERNEL_HALF_COSINE_SQUARED, Footprint::exact);
     s.model.antialias = true;
     s.camera.lens = test_lenses()[4].second;
-    EXPECT_GT(expect_walks_match(s, {.antialias = true, .smoothing = true, .lens = true}), 60u);
+    s.camera.shutter = {true, {0.01, -0.02, 0.015}, {0.02, -0.01, 0.03}};
+    EXPECT_GT(expect_walks_match(
+                  s, {.antialias = true, .smoothing = true, .lens = true, .shutter = true}),
+              60u);
 }
 
 TEST(ProjectionEffects, antialias_of_needles_and_discs_matches_double) {

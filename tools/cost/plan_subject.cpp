@@ -76,6 +76,9 @@ std::vector<int> switchable_effects(const PlanSubject& s, const PlanRequest& req
         if (effect == EFFECT_DEPTH && s.training)
             return std::ranges::any_of(s.dataset.views,
                                        [](const View& view) { return !view.depth.empty(); });
+        if (effect == EFFECT_SHUTTER)
+            return std::ranges::any_of(s.training ? s.dataset.views : s.views,
+                                       [](const View& view) { return view.camera.shutter.active; });
         if (effect == EFFECT_LENS) return !s.training || distorted(s.dataset);
         return std::find(impossible.begin(), impossible.end(), effect) == impossible.end();
     };

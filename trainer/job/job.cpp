@@ -33,6 +33,10 @@ EffectChoice effects_of(const TrainRequest& request) {
 
 // Before anything begins at the cameras or the points.
 std::string adjust_cameras(Dataset& dataset) {
+    if (std::ranges::any_of(dataset.views,
+                            [](const View& view) { return view.camera.shutter.active; }))
+        return "cameras: tracks do not adjust them before the run, as their rows are exposed one "
+               "after the other";
     const TrackAdjustment a = adjust_to_tracks(dataset);
     if (a.adjusted)
         return fmt::format(
@@ -55,6 +59,10 @@ void plan_effects(TrainJob& job, bool looks) {
     apply_plan(job.effects, dataset.views);
     const TrainOptions usual;
     const TrainOptions& t = job.options;
+    if (job.effects.row(EFFECT_SHUTTER).overridden && t.projection.shutter && !t.refine_cameras)
+        job.notes.emplace_back(
+            "Warning: --effects +shutter changes nothing, as no file says how cameras move while "
+            "rows are exposed; with --refine-cameras on, training finds it.");
     if (t.refine_cameras)
         job.cameras_note = adjust_cameras(dataset);
     else if (t.camera_lr || t.camera_from != usual.camera_from ||

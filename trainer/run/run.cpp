@@ -543,6 +543,11 @@ void Run::report_cameras() {
         "{:.3f} degrees; focal lengths by up to {:.2f} %, principal points by {:.2f} px",
         m->cameras, m->median_px, m->median_degrees, m->largest_px, m->largest_degrees,
         100 * m->largest_focal, m->largest_centre_px));
+    if (m->shutters)
+        progress_.note(fmt::format(
+            "over a read-out they move by {:.2f} px more than the file says in the middle, at most "
+            "by {:.2f} px",
+            m->median_rolled_px, m->largest_rolled_px));
 }
 
 void Run::report_kernel() {

@@ -397,7 +397,7 @@ std::filesystem::path RunLog::finish(const TrainResult& summary, const Trainer& 
         if (const KernelDefinition* own = kernel_definition(trainer.kernel()))
             metrics["kernel_definition"] = definition_json(*own);
     if (!summary.ended_early.empty()) metrics["ended_early"] = summary.ended_early;
-    if (const std::optional<CameraMoves> m = trainer.camera_moves())
+    if (const std::optional<CameraMoves> m = trainer.camera_moves()) {
         metrics["cameras"] = {{"refined", m->cameras},
                               {"median_px", m->median_px},
                               {"largest_px", m->largest_px},
@@ -405,6 +405,11 @@ std::filesystem::path RunLog::finish(const TrainResult& summary, const Trainer& 
                               {"largest_degrees", m->largest_degrees},
                               {"largest_focal_share", m->largest_focal},
                               {"largest_centre_px", m->largest_centre_px}};
+        if (m->shutters) {
+            metrics["cameras"]["median_rolled_px"] = m->median_rolled_px;
+            metrics["cameras"]["largest_rolled_px"] = m->largest_rolled_px;
+        }
+    }
     write_file_atomic(folder_ / "metrics.json", text_of(metrics, 2) + "\n");
     if (!with_report) return {};
     const auto report = folder_ / "report.html";

@@ -23,6 +23,9 @@ constexpr double kIntrinsicsShare = 0.5;
 constexpr double kAnchoredRate_px = 0.1, kFreeRate_px = 0.5;
 constexpr std::size_t kMostTracks = 1'000;  // most tracks that anchor one photo
 constexpr double kHuberPx = 1;              // beyond this error tracks pull no harder
+// A picture's rows deviate from the middle by 1 / sqrt(12) of its height (the root of the mean
+// square): so much less than a pose does a change over the read-out shift the picture.
+const double kRowSpread = std::sqrt(12.0);
 constexpr std::size_t kFewestCameras = 3;
 constexpr std::size_t kPointsOfAll = 20'000;  // points that size a step where there are no tracks
 
@@ -86,6 +89,7 @@ CameraRefinement::CameraRefinement(const Dataset& dataset, const TrainOptions& o
       anchor_(options.camera_anchor),
       from_(options.camera_from),
       iterations_(options.iterations),
+      shutters_(options.projection.shutter),
       points_(positions(dataset.points)),
       pose_of_(dataset.views.size(), -1),
       gauge_({}, {}) {
@@ -110,7 +114,7 @@ CameraRefinement::CameraRefinement(const Dataset& dataset, const TrainOptions& o
         groups_[at->second].trained_views += 1;
         pose_of_[v] = static_cast<int>(poses_.size());
         poses_.push_back(
-            {static_cast<int>(v), PoseMetric(c, seen[seen.size() > 1 ? v : 0], depth), {}, {}});
+            {static_cast<int>(v), PoseMetric(c, seen[seen.size() > 1 ? v : 0], depth), {}, {}, {}});
     }
     cameras_ = start_;
     for (const TrackObservation& o : track_observations(dataset))
@@ -144,13 +148,22 @@ PoseVector CameraRefinement::step_of(const Pose& pose) const {
     return pose.metric.to_step(x);
 }
 
-// Half the mean of the squared error over the camera's tracks, by Huber's loss: d/d(camera).
+PoseVector CameraRefinement::shutter_step_of(const Pose& pose) const {
+    PoseVector x;
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = kRowSpread * double(pose.shutter.value[i]);
+    return pose.metric.to_step(x);
+}
+
+// Half the mean of the squared error over the camera's tracks, by Huber's loss: d/d(camera). A
+// point was seen by the camera of its row.
 void CameraRefinement::add_anchor(const Pose& pose, CameraGradient& d) const {
     if (pose.tracks.empty()) return;
-    const Camera& c = camera(pose.view);
+    const Camera& middle = camera(pose.view);
     const double weight = anchor_ / static_cast<double>(pose.tracks.size());
     for (const TrackObservation& o : pose.tracks) {
         const glm::dvec3& x = points_[o.point];
+        const double time = o.at_px.y / middle.height - 0.5;
+        const Camera c = camera_at_row(middle, time);
         const glm::dvec3 p = c.rotation * x + c.translation;
         if (!(p.z > 0)) continue;
         const glm::dvec2 ratio(p.x / p.z, p.y / p.z);
@@ -160,8 +173,17 @@ void CameraRefinement::add_anchor(const Pose& pose, CameraGradient& d) const {
             weight * error * std::min(1.0, kHuberPx / std::max(glm::length(error), 1e-12));
         const glm::dvec3 d_p(c.fx * e.x / p.z, c.fy * e.y / p.z,
                              -(c.fx * e.x * ratio.x + c.fy * e.y * ratio.y) / p.z);
-        d.d_rotation += glm::outerProduct(d_p, x);
-        d.d_translation += d_p;
+        if (middle.shutter.active) {
+            const glm::dvec3 angle = time * middle.shutter.turn;
+            const glm::dvec3 of_middle = glm::transpose(exp_rotation(angle)) * d_p;
+            d.d_turn += time * (glm::transpose(left_jacobian(angle)) * glm::cross(p, d_p));
+            d.d_move -= time * of_middle;
+            d.d_rotation += glm::outerProduct(of_middle, x);
+            d.d_translation += of_middle;
+        } else {
+            d.d_rotation += glm::outerProduct(d_p, x);
+            d.d_translation += d_p;
+        }
         d.d_fx += e.x * ratio.x;
         d.d_fy += e.y * ratio.y;
         d.d_cx += e.x;
@@ -201,10 +223,18 @@ bool CameraRefinement::step(int iteration, std::span<const CameraVisit> visits) 
         bool finite = true;
         for (const double value : gradient) finite &= std::isfinite(value);
         for (const double value : own) finite &= std::isfinite(value);
+        for (int c = 0; c < 3; ++c)
+            finite &= std::isfinite(d.d_turn[c]) && std::isfinite(d.d_move[c]);
         if (!finite) continue;
         auto& sum = by_group[group_of_[static_cast<std::size_t>(visit.view)]];
         for (std::size_t i = 0; i < 4; ++i) sum[i] += own[i] * unit[static_cast<int>(i)];
         pose.trained.step(gradient, now);
+        if (shutters_) {
+            PoseVector by_shutter = pose.metric.gradient(
+                {d.d_turn.x, d.d_turn.y, d.d_turn.z, -d.d_move.x, -d.d_move.y, -d.d_move.z});
+            for (double& value : by_shutter) value *= kRowSpread;
+            pose.shutter.step(by_shutter, now);
+        }
     }
     for (const auto& [number, gradient] : by_group) {
         Group& group = groups_[static_cast<std::size_t>(number)];
@@ -227,8 +257,15 @@ void CameraRefinement::place_cameras() {
     for (std::size_t v = 0; v < cameras_.size(); ++v) {
         const int pose = pose_of_[v];
         cameras_[v] = start_[v];
-        if (pose >= 0)
-            cameras_[v] = moved_camera(start_[v], step_of(poses_[static_cast<std::size_t>(pose)]));
+        if (pose >= 0) {
+            const Pose& own = poses_[static_cast<std::size_t>(pose)];
+            cameras_[v] = moved_camera(start_[v], step_of(own));
+            if (shutters_) {
+                const PoseVector s = shutter_step_of(own);
+                cameras_[v].shutter = {true, start_[v].shutter.turn + glm::dvec3(s[0], s[1], s[2]),
+                                       start_[v].shutter.move - glm::dvec3(s[3], s[4], s[5])};
+            }
+        }
         const Group& group = groups_[static_cast<std::size_t>(group_of_[v])];
         const auto& y = group.trained.value;
         cameras_[v].fx += double(y[0]) * group.unit.x;
@@ -240,8 +277,9 @@ void CameraRefinement::place_cameras() {
 
 CameraMoves CameraRefinement::moves() const {
     CameraMoves all;
-    std::vector<double> px, degrees;
+    std::vector<double> px, degrees, rolled;
     for (const Pose& pose : poses_) {
+        rolled.push_back(pose.metric.shift_px(shutter_step_of(pose)));
         const PoseVector step = step_of(pose);
         px.push_back(pose.metric.shift_px(step));
         degrees.push_back(glm::length(glm::dvec3(step[0], step[1], step[2])) * 180 /
@@ -250,6 +288,9 @@ CameraMoves CameraRefinement::moves() const {
     all.cameras = px.size();
     all.largest_px = *std::max_element(px.begin(), px.end());
     all.largest_degrees = *std::max_element(degrees.begin(), degrees.end());
+    all.shutters = shutters_;
+    all.largest_rolled_px = *std::max_element(rolled.begin(), rolled.end());
+    all.median_rolled_px = nearest_rank(rolled, 0.5);
     all.median_px = nearest_rank(px, 0.5);
     all.median_degrees = nearest_rank(degrees, 0.5);
     for (std::size_t v = 0; v < cameras_.size(); ++v) {
@@ -269,7 +310,10 @@ std::vector<float> CameraRefinement::state() const {
             values.insert(values.end(), part->begin(), part->end());
         values.push_back(trained.visits);
     };
-    for (const Pose& pose : poses_) add(pose.trained);
+    for (const Pose& pose : poses_) {
+        add(pose.trained);
+        if (shutters_) add(pose.shutter);
+    }
     for (const Group& group : groups_) add(group.trained);
     return values;
 }
@@ -287,7 +331,10 @@ void CameraRefinement::restore(const std::vector<float>& state) {
         }
         trained.visits = *at++;
     };
-    for (Pose& pose : poses_) take(pose.trained);
+    for (Pose& pose : poses_) {
+        take(pose.trained);
+        if (shutters_) take(pose.shutter);
+    }
     for (Group& group : groups_) take(group.trained);
     place_cameras();
 }
@@ -305,6 +352,22 @@ GradientOptions gradient_options(const Accuracy& accuracy) {
     options.camera = true;
     return options;
 }
+
+// Adam on the coordinates of a step.
+struct AlignmentStep {
+    PoseVector first{}, second{};
+
+    PoseVector step(const PoseVector& d, int number, double rate) {
+        PoseVector x{};
+        for (std::size_t i = 0; i < 6; ++i) {
+            first[i] = kAlignBeta1 * first[i] + (1 - kAlignBeta1) * d[i];
+            second[i] = kAlignBeta2 * second[i] + (1 - kAlignBeta2) * d[i] * d[i];
+            const double size = std::sqrt(second[i] / (1 - std::pow(kAlignBeta2, number + 1)));
+            if (size > 0) x[i] = -rate * first[i] / (1 - std::pow(kAlignBeta1, number + 1)) / size;
+        }
+        return x;
+    }
+};
 
 // The mean squared error of the picture and its gradient.
 double squared_error(const ImageF& image, const ImageF& truth, const ImageU8& photo, bool masked,
@@ -348,7 +411,7 @@ Camera CameraAlignment::align(const Camera& camera, const ImageU8& photo,
     const ImageF truth = composite(photo, background);
     ImageF d_image(photo.width, photo.height, 3);
     Camera now = camera, best = camera;
-    PoseVector first{}, second{};
+    AlignmentStep of_pose, of_shutter;
     double least = 0;
     for (int step = 0; step <= kSteps; ++step) {
         const double error =
@@ -360,16 +423,18 @@ Camera CameraAlignment::align(const Camera& camera, const ImageU8& photo,
         if (step == kSteps) break;
         const ViewGradients view = renderer_.backward(d_image);
         const PoseVector d = metric.gradient(by_step(now, *view.d_camera));
+        const CameraGradient& g = *view.d_camera;
+        const PoseVector d_shutter = metric.gradient(
+            {g.d_turn.x, g.d_turn.y, g.d_turn.z, -g.d_move.x, -g.d_move.y, -g.d_move.z});
         const double rate =
             kFirstRate_px * std::pow(kLastRate_px / kFirstRate_px, double(step) / kSteps);
-        PoseVector x{};
-        for (std::size_t i = 0; i < 6; ++i) {
-            first[i] = kAlignBeta1 * first[i] + (1 - kAlignBeta1) * d[i];
-            second[i] = kAlignBeta2 * second[i] + (1 - kAlignBeta2) * d[i] * d[i];
-            const double size = std::sqrt(second[i] / (1 - std::pow(kAlignBeta2, step + 1)));
-            if (size > 0) x[i] = -rate * first[i] / (1 - std::pow(kAlignBeta1, step + 1)) / size;
-        }
-        now = moved_camera(now, metric.to_step(x));
+        now = moved_camera(now, metric.to_step(of_pose.step(d, step, rate)));
+        if (!now.shutter.active) continue;
+        PoseVector x = of_shutter.step(d_shutter, step, rate);
+        for (double& value : x) value *= kRowSpread;
+        const PoseVector s = metric.to_step(x);
+        now.shutter.turn += glm::dvec3(s[0], s[1], s[2]);
+        now.shutter.move -= glm::dvec3(s[3], s[4], s[5]);
     }
     return best;
 }

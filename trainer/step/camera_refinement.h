@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // CameraRefinement: poses of the training photos, and the intrinsics that they share, trained
 // beside the splats. The gradient through the picture comes from the device; the reprojection of
-// tracks anchors it. Adam, a camera and a group of intrinsics at a time, in coordinates of which a
-// step of 1 shifts a picture by 1 px (engine/scene/pose_metric.h). What moves the scene as a whole
-// is taken out of every step. All on the host in double, rounded to float where it is kept: a run
-// repeats, and every rank makes the same step.
+// tracks anchors it. Where shutters roll, each photo's turn and move are trained, too. Adam, a
+// camera and a group of intrinsics at a time, in coordinates of which a step of 1 shifts a picture
+// by 1 px (engine/scene/pose_metric.h). What moves the scene as a whole is taken out of every step.
+// All on the host in double, rounded to float where it is kept: a run repeats, and every rank makes
+// the same step.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +29,8 @@ struct CameraMoves {
     double median_degrees = 0, largest_degrees = 0;  // angle that a camera turned by
     double largest_focal = 0;                        // share by which a focal length changed
     double largest_centre_px = 0;                    // shift of a principal point
+    bool shutters = false;
+    double median_rolled_px = 0, largest_rolled_px = 0;  // change of the shift over a read-out
 };
 
 /// What one photo of a step says about its camera.
@@ -52,10 +55,13 @@ class CameraRefinement {
 
     CameraMoves moves() const;
 
-    /// For checkpoints: values, moments and visits of poses, then of intrinsics.
+    /// For checkpoints: values, moments and visits of poses, of their shutters where those are
+    /// trained, then of intrinsics.
     std::vector<float> state() const;
     void restore(const std::vector<float>& state);
-    std::size_t state_size() const { return poses_.size() * 19 + groups_.size() * 13; }
+    std::size_t state_size() const {
+        return poses_.size() * (shutters_ ? 38 : 19) + groups_.size() * 13;
+    }
 
   private:
     template <std::size_t N>
@@ -68,6 +74,7 @@ class CameraRefinement {
         int view = 0;
         PoseMetric metric;
         Trained<6> trained;
+        Trained<6> shutter;  // change of turn and -move, over the read-out as kRowSpread says
         std::vector<TrackObservation> tracks;
     };
     struct Group {  // views with the same intrinsics
@@ -79,10 +86,12 @@ class CameraRefinement {
     void add_anchor(const Pose& pose, CameraGradient& gradient) const;
     PoseVector pose_gradient(const Pose& pose, const CameraGradient& gradient) const;
     PoseVector step_of(const Pose& pose) const;
+    PoseVector shutter_step_of(const Pose& pose) const;
     void place_cameras();
 
     double rate_px_, anchor_, from_;
     int iterations_;
+    bool shutters_;                        // whether shutters are trained
     std::vector<Camera> start_, cameras_;  // [view]
     std::vector<glm::dvec3> points_;       // points of the data set, which stay fixed
     std::vector<Pose> poses_;              // one per training photo, in order
@@ -99,7 +108,8 @@ class CameraAlignment {
     /// Aligns cameras with pictures of this model.
     CameraAlignment(Device& device, const SplatModel& model, const Accuracy& accuracy = {});
 
-    /// The camera, turned and moved; its intrinsics stay. Takes 40 steps of Adam on the mean
+    /// The camera, turned and moved, with another turn and move of a shutter that rolls; its
+    /// intrinsics stay. Takes 40 steps of Adam on the mean
     /// squared error, from 0.2 px at first to 0.01 px in the end, and returns the best camera on
     /// the way. photo: RGBA of the camera's size. Masked pixels do not count where alpha is a mask.
     Camera align(const Camera& camera, const ImageU8& photo, const glm::vec3& background,

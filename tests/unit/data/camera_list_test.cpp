@@ -122,6 +122,22 @@ TEST(CameraList, written_list_reads_back) {
     EXPECT_EQ(load_cameras(path.parent_path())[0].name, "a");
 }
 
+TEST(CameraList, a_rolling_shutter_reads_back_and_a_broken_one_is_an_error) {
+    View view;
+    view.name = "a";
+    view.camera = {.width = 8, .height = 6, .fx = 5, .fy = 5, .cx = 4, .cy = 3};
+    view.camera.shutter = {true, {0.1, 0.2, -0.3}, {1e-3, 2, 3}};
+    const std::string text = format_camera_list({view, view});
+    const ShutterTerms read = parse_camera_list(text, "c.json")[1].camera.shutter;
+    EXPECT_TRUE(read.active);
+    EXPECT_EQ(read.turn, view.camera.shutter.turn);
+    EXPECT_EQ(read.move, view.camera.shutter.move);
+    std::string broken = text;
+    broken.replace(broken.find("\"turn\""), 6, "\"trun\"");
+    EXPECT_NE(error_of([&] { parse_camera_list(broken, "c.json"); }).find("turn"),
+              std::string::npos);
+}
+
 TEST(CameraList, names_that_are_no_utf_8_are_written) {
     std::vector<View> views = parse_camera_list(kOne, "cameras.json");
     views[0].name = "f\xfcr.jpg";

@@ -226,6 +226,54 @@ TEST(Transforms, keys_of_other_dialects_are_read) {
     EXPECT_NE(halfway.notes[0].find("1 of them move"), std::string::npos) << halfway.notes[0];
 }
 
+// The camera of half a read-out later is where the file's velocities take it, by the file's own
+// axes, and for instant-ngp on its way from start to end.
+TEST(Transforms, rolling_shutters_are_read_in_both_forms) {
+    const std::string rolling = frame(
+        "a", R"("camera_linear_velocity": [1, 2, 3], "camera_angular_velocity": [0, 0, 10], )");
+    const TransformsFile file_of = parse_transforms(
+        file(R"("rolling_shutter_time": 0.02, "exposure_time": 0.001, )", rolling), "t.json");
+    const TransformsFrame& f = file_of.frames[0];
+    ASSERT_TRUE(f.shutter.active);
+    Camera camera;
+    camera.rotation = f.rotation;
+    camera.translation = f.translation;
+    camera.shutter = f.shutter;
+    const Camera last = camera_at_row(camera, 0.5);
+    // Camera to world of the file: turned by exp(0.1 z) about its own axis z, moved by (1, 2, 3).
+    glm::dmat3 axes = glm::transpose(camera.rotation);
+    axes[1] = -axes[1], axes[2] = -axes[2];
+    const glm::dmat3 turned = axes * exp_rotation({0, 0, 0.1});
+    const glm::dvec3 moved = camera.centre() + axes * glm::dvec3(0.01, 0.02, 0.03);
+    glm::dmat3 got = glm::transpose(last.rotation);
+    got[1] = -got[1], got[2] = -got[2];
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(glm::length(got[c] - turned[c]), 0, 1e-12);
+    EXPECT_NEAR(glm::length(last.centre() - moved), 0, 1e-12);
+    ASSERT_EQ(file_of.notes.size(), 1u);
+    EXPECT_NE(file_of.notes[0].find("1 of 1 frames have a rolling shutter"), std::string::npos);
+
+    const std::string way =
+        R"({"file_path": "a", "transform_matrix_start": [[1,0,0,1],[0,1,0,2],[0,0,1,3]],
+            "transform_matrix_end": [[0,-1,0,3],[1,0,0,2],[0,0,1,3]]})";
+    const TransformsFile ngp =
+        parse_transforms(file(R"("rolling_shutter": [0.25, 0, 0.5], )", way), "t.json");
+    Camera c;
+    c.rotation = ngp.frames[0].rotation;
+    c.translation = ngp.frames[0].translation;
+    c.shutter = ngp.frames[0].shutter;
+    for (const auto& [time, x, degrees] : {std::tuple{-0.5, 1.5, 22.5}, {0.5, 2.5, 67.5}}) {
+        const Camera row = camera_at_row(c, time);
+        EXPECT_NEAR(glm::length(row.centre() - glm::dvec3(x, 2, 3)), 0, 1e-12) << time;
+        const glm::dvec3 right = glm::transpose(row.rotation)[0];
+        EXPECT_NEAR(glm::degrees(std::atan2(right.y, right.x)), degrees, 1e-9) << time;
+    }
+    for (const char* wrong : {R"("rolling_shutter": [0, 0], )", R"("rolling_shutter": [0, 1, 0], )",
+                              R"("rolling_shutter": [0, 0, "x"], )"})
+        EXPECT_NE(parse_error(file(wrong, way)).find("rolling_shutter"), std::string::npos);
+    EXPECT_NE(notes_of(R"("rolling_shutter_time": 0.02, )", frame("a")).find("no frame says how"),
+              std::string::npos);
+}
+
 TEST(Transforms, two_keys_for_one_fact_are_compared) {
     const auto refused = [](const std::string& error) {
         EXPECT_NE(error.find("but"), std::string::npos) << error;

@@ -59,6 +59,10 @@ TEST(EffectPlanOfScene, one_need_switches_on_one_effect_and_none_none) {
              lens.ray_min = glm::dvec2(-2);
              lens.ray_max = glm::dvec2(2);
          }},
+        {EFFECT_SHUTTER,
+         [](Scene& s) {
+             s.views[0].camera.shutter = {true, {0, 0.01, 0}, {}};
+         }},
         {EFFECT_NEAR,
          [](Scene& s) {  // half a unit beside the camera and as wide as that
              const Camera& c = s.views[0].camera;

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Gradients of the projection's effects (lens, 3D smoothing filter and anti-aliasing) against
-// central differences of a random linear function of the projection's results.
+// Gradients of the projection's effects (lens, rolling shutter, 3D smoothing filter and
+// anti-aliasing) against central differences of a random linear function of the projection's
+// results.
 #include <gtest/gtest.h>
 
 #include "engine/core/rng.h"
 #include "engine/reference/reference_lens.h"
+#include "engine/reference/reference_render.h"
+#include "engine/scene/pose_metric.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/test_lenses.h"
 #include "tests/support/test_scene.h"
@@ -140,6 +143,64 @@ TEST(ReferenceEffects, beyond_the_fold_nothing_is_seen) {
     for (size_t i = 0; i < splats.size(); ++i)
         EXPECT_NE(project(splats, i, s.camera, {}, kernel_table(0, Footprint::psi)).cull,
                   Cull::none);
+}
+
+const ShutterTerms kShutters[] = {{true, {0.01, -0.02, 0.015}, {0.02, -0.01, 0.03}},
+                                  {true, {-0.1, 0.15, 0.2}, {0.3, 0.2, -0.2}}};
+
+TEST(ReferenceEffects, shutter_gradients_match_differences) {
+    for (const ShutterTerms& shutter : kShutters)
+        for (const bool lens : {false, true})
+            for (const bool antialias : {false, true}) {
+                test::TestScene s = scene_of(0.8);
+                s.camera.shutter = shutter;
+                if (lens) s.camera.lens = test::test_lenses()[1].second;
+                auto splats = make_splats<double>(s.model);
+                splats.antialias = antialias;
+                EXPECT_GT(expect_gradients("shutter", splats, s.camera), 15U);
+            }
+}
+
+TEST(ReferenceEffects, a_splat_is_where_the_camera_of_its_row_sees_it) {
+    for (const ShutterTerms& shutter : kShutters) {
+        test::TestScene s = scene_of(0.8);
+        s.camera.shutter = shutter;
+        const auto splats = make_splats<double>(s.model);
+        const KernelTable& kernel = kernel_table(splats.kernel, splats.footprint);
+        size_t seen = 0;
+        for (size_t i = 0; i < splats.size(); ++i) {
+            const auto p = project(splats, i, s.camera, {}, kernel);
+            if (p.cull != Cull::none) continue;
+            ++seen;
+            const double time = p.mean_px.y / s.camera.height - 0.5;
+            const auto row = project(splats, i, camera_at_row(s.camera, time), {}, kernel);
+            EXPECT_NEAR(p.mean_px.x, row.mean_px.x, 1e-9);
+            EXPECT_NEAR(p.mean_px.y, row.mean_px.y, 1e-9);
+            EXPECT_NEAR(p.depth, row.depth, 1e-12);
+        }
+        EXPECT_GT(seen, 15U);
+    }
+}
+
+// The truth: every row from a picture of its own pose.
+TEST(ReferenceEffects, a_rolling_picture_is_made_of_the_rows_of_still_ones) {
+    test::TestScene s = scene_of(0.8);
+    s.camera.shutter = kShutters[1];
+    const auto rolling = render(s.model, s.camera, {});
+    const auto still = render(s.model, camera_at_row(s.camera, 0), {});
+    double error = 0, error_of_still = 0;
+    const auto square = [](double x) { return x * x; };
+    for (int y = 0; y < s.camera.height; ++y) {
+        const auto row =
+            render(s.model, camera_at_row(s.camera, (y + 0.5) / s.camera.height - 0.5), {});
+        for (int x = 0; x < s.camera.width; ++x)
+            for (int c = 0; c < 3; ++c) {
+                const double truth = row.images.colour.at(x, y, c);
+                error += square(rolling.images.colour.at(x, y, c) - truth);
+                error_of_still += square(still.images.colour.at(x, y, c) - truth);
+            }
+    }
+    EXPECT_LT(error, 0.01 * error_of_still);  // measured: SHARE
 }
 
 TEST(ReferenceEffects, smoothing_filter_gradients_match_differences) {

@@ -47,6 +47,56 @@ TEST(CameraRefinement, tracks_bring_disturbed_cameras_back) {
     EXPECT_EQ(cameras.moves().cameras, truth.views.size());
 }
 
+/// The same points seen by cameras that move while rows are exposed; the data set does not say how.
+std::vector<Camera> let_shutters_roll(Dataset& dataset) {
+    Pcg32 rng(3);
+    std::vector<Camera> truth;
+    for (View& view : dataset.views) {
+        Camera& c = view.camera;
+        c.shutter.active = true;
+        truth.push_back(c);
+        ShutterTerms& rolls = truth.back().shutter;
+        for (int k = 0; k < 3; ++k)
+            rolls.turn[k] = rng.uniform(-0.02, 0.02), rolls.move[k] = rng.uniform(-0.05, 0.05);
+    }
+    const auto places = places_of(dataset);
+    for (size_t p = 0; p < places.size(); ++p)
+        for (size_t k = dataset.points.seen_begin[p]; k < dataset.points.seen_begin[p + 1]; ++k) {
+            const Camera& c = truth[dataset.points.seen_by[k]];
+            glm::dvec2 at(0.0, 0.5 * c.height);
+            for (int step = 0; step < 8; ++step)
+                at = pinhole_pixel(camera_at_row(c, at.y / c.height - 0.5), places[p]);
+            dataset.points.seen_at[2 * k] = static_cast<float>(at.x / c.width);
+            dataset.points.seen_at[2 * k + 1] = static_cast<float>(at.y / c.height);
+        }
+    return truth;
+}
+
+TEST(CameraRefinement, tracks_tell_how_cameras_moved_while_their_rows_were_exposed) {
+    Dataset dataset = tracked_dataset();
+    const std::vector<Camera> truth = let_shutters_roll(dataset);
+    const auto places = places_of(dataset);
+    const auto apart = [&](const Camera& a, const Camera& b) {
+        return std::max(shift_px(camera_at_row(a, -0.5), camera_at_row(b, -0.5), places),
+                        shift_px(camera_at_row(a, 0.5), camera_at_row(b, 0.5), places));
+    };
+    TrainOptions options = refining(1'600);
+    options.projection.shutter = true;
+    CameraRefinement cameras(dataset, options);
+    for (size_t v = 0; v < truth.size(); ++v)
+        EXPECT_GT(apart(dataset.views[v].camera, truth[v]), 0.4);
+    visit_all(cameras, dataset, 0, 1'600);
+    for (size_t v = 0; v < truth.size(); ++v)
+        EXPECT_LT(apart(cameras.camera(static_cast<int>(v)), truth[v]), 0.2);
+    EXPECT_GT(cameras.moves().median_rolled_px, 1);
+
+    CameraRefinement again(dataset, options);
+    again.restore(cameras.state());
+    for (size_t v = 0; v < truth.size(); ++v)
+        EXPECT_EQ(again.camera(static_cast<int>(v)).shutter.turn,
+                  cameras.camera(static_cast<int>(v)).shutter.turn);
+}
+
 TEST(CameraRefinement, cameras_that_are_right_stay) {
     const Dataset truth = tracked_dataset();
     CameraRefinement cameras(truth, refining(400));
