@@ -17,7 +17,7 @@ namespace {
 
 struct ModelRow {
     std::string_view name;
-    int parameters;  // 0: the model cannot be read
+    int parameters;
     bool one_focal;  // f, cx, cy rather than fx, fy, cx, cy
 };
 
@@ -34,7 +34,7 @@ constexpr ModelRow kModels[] = {
     {"SIMPLE_RADIAL_FISHEYE", 4, true},
     {"RADIAL_FISHEYE", 5, true},
     {"THIN_PRISM_FISHEYE", 12, false},
-    {"RAD_TAN_THIN_PRISM_FISHEYE", 0, false},
+    {"RAD_TAN_THIN_PRISM_FISHEYE", 16, false},
     {"SIMPLE_DIVISION", 4, true},
     {"DIVISION", 5, false},
     {"SIMPLE_FISHEYE", 3, true},
@@ -120,9 +120,6 @@ void check_lens(const LensModel& lens, const std::string& where) {
     if (!row)
         throw Error(where, fmt::format("the camera model {} is unknown", lens.model),
                     "Export the cameras with one of COLMAP's models.");
-    if (row->parameters == 0)
-        throw Error(where, fmt::format("the camera model {} is not read", lens.model),
-                    "Undistort with `colmap image_undistorter`, which writes PINHOLE.");
     if (static_cast<int>(lens.parameters.size()) != row->parameters)
         throw Error(where,
                     fmt::format("{} has {} parameters, not {}", lens.model, row->parameters,
@@ -207,7 +204,7 @@ Lens::Lens(const LensModel& model) {
     if (model.model == "SIMPLE_RADIAL" || model.model == "SIMPLE_RADIAL_FISHEYE") {
         k_[0] = p[0];
     } else if (model.model == "RADIAL" || model.model == "RADIAL_FISHEYE") {
-        k_ = {p[0], p[1], 0, 0};
+        k_ = {p[0], p[1]};
     } else if (model.model == "OPENCV_FISHEYE") {
         k_ = {p[0], p[1], p[2], p[3]};
     } else if (model.model == "FOV") {
@@ -221,8 +218,14 @@ Lens::Lens(const LensModel& model) {
         alpha_ = p[0];
         beta_ = p[1];
         if (alpha_ != 0) front_ = Front::unified;
+    } else if (model.model == "RAD_TAN_THIN_PRISM_FISHEYE") {
+        std::copy_n(p, k_.size(), k_.begin());
+        after_ = true;
+        p2_ = p[6];  // its p0 goes with x
+        p1_ = p[7];
+        s1_ = p[8], high1_ = p[9], s2_ = p[10], high2_ = p[11];
     } else if (row.parameters >= 8) {  // OPENCV, FULL_OPENCV, THIN_PRISM_FISHEYE, FOUR_RADIAL
-        k_ = {p[0], p[1], 0, 0};
+        k_ = {p[0], p[1]};
         p1_ = p[2];
         p2_ = p[3];
         if (model.model == "FULL_OPENCV") {
@@ -241,23 +244,43 @@ Lens::Lens(const LensModel& model) {
     fold_ = find_fold();
 }
 
+/// Adds the tangential and prism terms at v.
+void Lens::add_bend(glm::dvec2 v, Distorted& to) const {
+    const double x = v.x, y = v.y, r2 = x * x + y * y;
+    const double prism1 = s1_ + 2 * r2 * high1_, prism2 = s2_ + 2 * r2 * high2_;
+    to.value = {to.value.x + 2 * p1_ * x * y + p2_ * (r2 + 2 * x * x) + (s1_ + high1_ * r2) * r2,
+                to.value.y + 2 * p2_ * x * y + p1_ * (r2 + 2 * y * y) + (s2_ + high2_ * r2) * r2};
+    const double cross0 = to.jacobian[0].y + 2 * p1_ * x + 2 * p2_ * y;
+    const double cross1 = to.jacobian[1].x + 2 * p1_ * x + 2 * p2_ * y;
+    to.jacobian[0] = {to.jacobian[0].x + 2 * p1_ * y + 6 * p2_ * x + 2 * prism1 * x,
+                      cross0 + 2 * prism2 * x};
+    to.jacobian[1] = {cross1 + 2 * prism1 * y,
+                      to.jacobian[1].y + 2 * p2_ * x + 6 * p1_ * y + 2 * prism2 * y};
+}
+
 Lens::Distorted Lens::distort(glm::dvec2 w) const {
     const double x = w.x, y = w.y, r2 = x * x + y * y;
-    const double top = 1 + r2 * (k_[0] + r2 * (k_[1] + r2 * (k_[2] + r2 * k_[3])));
-    const double top_slope = k_[0] + r2 * (2 * k_[1] + r2 * (3 * k_[2] + r2 * 4 * k_[3]));
+    double top = 0, top_slope = 0;
+    for (std::size_t i = k_.size(); i-- > 0;) {
+        top_slope = top_slope * r2 + double(i + 1) * k_[i];
+        top = (top + k_[i]) * r2;
+    }
+    top += 1;
     const double bottom = 1 + r2 * (d_[0] + r2 * (d_[1] + r2 * d_[2]));
     const double bottom_slope = d_[0] + r2 * (2 * d_[1] + r2 * 3 * d_[2]);
     const double g = top / bottom;
     const double slope = (top_slope - g * bottom_slope) / bottom;  // dg / d(r^2)
     Distorted out;
-    out.value = {x * g + 2 * p1_ * x * y + p2_ * (r2 + 2 * x * x) + s1_ * r2,
-                 y * g + 2 * p2_ * x * y + p1_ * (r2 + 2 * y * y) + s2_ * r2};
-    const double cross = 2 * x * y * slope + 2 * p1_ * x + 2 * p2_ * y;
-    out.jacobian[0] = {g + 2 * x * x * slope + 2 * p1_ * y + 6 * p2_ * x + 2 * s1_ * x,
-                       cross + 2 * s2_ * x};
-    out.jacobian[1] = {cross + 2 * s1_ * y,
-                       g + 2 * y * y * slope + 2 * p2_ * x + 6 * p1_ * y + 2 * s2_ * y};
-    return out;
+    out.value = {x * g, y * g};
+    out.jacobian[0] = {g + 2 * x * x * slope, 2 * x * y * slope};
+    out.jacobian[1] = {2 * x * y * slope, g + 2 * y * y * slope};
+    if (!after_) {
+        add_bend(w, out);
+        return out;
+    }
+    Distorted after{out.value, glm::dmat2(1.0)};
+    add_bend(out.value, after);
+    return {after.value, after.jacobian * out.jacobian};
 }
 
 double Lens::find_fold() const {
@@ -314,6 +337,8 @@ LensTerms Lens::terms(glm::dvec2 size) const {
     terms.d = d_;
     terms.tangential = {p1_, p2_};
     terms.prism = {s1_, s2_};
+    terms.prism_high = {high1_, high2_};
+    terms.after = after_;
     terms.fold = fold_;
     terms.ray_min = terms.ray_max = glm::dvec2(0.0);
     const auto see = [&](double x, double y) {

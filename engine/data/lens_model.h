@@ -2,12 +2,13 @@
 // Lens: the camera models of COLMAP 3.8 and the equidistant, division and unified ones of later
 // versions, as one function of a ray and its inverse.
 // Every model is a pinhole after a distortion of the plane z = 1,
-//   w' = w (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) / (1 + d1 r^2 + d2 r^4 + d3 r^6)
-//        + tangential (p1, p2) + thin prism (s1, s2),   r = |w|,
+//   w' = v + tangential (p1, p2) + thin prism (s1, s2),
+//   v = w (1 + k1 r^2 + .. + k6 r^12) / (1 + d1 r^2 + d2 r^4 + d3 r^6),   r = |w|,
 // with w the ray itself or, for the fisheye models, the ray at distance theta; FOV has its own
-// form. EUCM has w = ray / (alpha sqrt(1 + beta r^2) + 1 - alpha), r = |ray|; DIVISION is that with
-// alpha = 1/2 and beta = -4 k. Source: COLMAP 3.8, src/base/camera_models.h; Weng et al. 1992;
-// Devernay and Faugeras 2001.
+// form. RAD_TAN_THIN_PRISM_FISHEYE, Project Aria's, takes tangential and prism terms at v in place
+// of w, and the prism has terms of the fourth power, too. EUCM has w = ray / (alpha sqrt(1 + beta
+// r^2) + 1 - alpha), r = |ray|; DIVISION is that with alpha = 1/2 and beta = -4 k. Source:
+// COLMAP 3.8, src/base/camera_models.h; Weng et al. 1992; Devernay and Faugeras 2001.
 #pragma once
 
 #include <array>
@@ -26,12 +27,12 @@ constexpr std::string_view kFourRadial = "FOUR_RADIAL";
 /// COLMAP's panorama: its parameters are the width and height of the photo, and no Lens is made of
 /// it. See engine/scene/panorama.h.
 constexpr std::string_view kPanorama = "EQUIRECTANGULAR";
-/// COLMAP's name for a model id, 0 to 17; empty for other ids. check_lens knows which can be read.
+/// COLMAP's name for a model id, 0 to 17; empty for other ids.
 std::string_view lens_model_name(int id);
-/// The number of parameters; -1 for an unknown name, 0 for a model that cannot be read.
+/// The number of parameters; -1 for an unknown name.
 int lens_parameter_count(std::string_view model);
 
-/// Throws Error where the model is unknown or cannot be read, the parameter count is wrong, a
+/// Throws Error where the model is unknown, the parameter count is wrong, a
 /// parameter is not finite, a focal length is not positive, or the size is not between 1 and
 /// 100,000 px.
 void check_lens(const LensModel& lens, const std::string& where);
@@ -74,10 +75,14 @@ class Lens {
     double find_fold() const;
     double unified_factor(double square) const;  // w over the ray of this squared length
 
+    void add_bend(glm::dvec2 v, Distorted& to) const;
+
     Front front_ = Front::plane;
-    std::array<double, 4> k_{};
+    bool after_ = false;  // tangential and prism act after the radial factor
+    std::array<double, 6> k_{};
     std::array<double, 3> d_{};
-    double p1_ = 0, p2_ = 0, s1_ = 0, s2_ = 0, omega_ = 0, alpha_ = 0, beta_ = 0;
+    double p1_ = 0, p2_ = 0, s1_ = 0, s2_ = 0, high1_ = 0, high2_ = 0, omega_ = 0, alpha_ = 0,
+           beta_ = 0;
     double fold_ = 0;  // largest |w| up to which distort is one to one
 };
 

@@ -49,6 +49,9 @@ gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin, floa
         d.lens_prism = glm::vec2(lens.prism);
         d.lens_front = glm::vec2(lens.front_tan, lens.front_scale);
         d.lens_fold = static_cast<float>(lens.fold);
+        d.lens_radial_high = glm::vec2(lens.k[4], lens.k[5]);
+        d.lens_prism_high = glm::vec2(lens.prism_high);
+        d.lens_after = lens.after ? 1 : 0;
     }
     d.ratio_min = glm::vec2(low - margin);
     d.ratio_max = glm::vec2(high + margin);

@@ -95,7 +95,7 @@ Vec2<T> radial_second(const Vec2<T>& v, const Radial<T>& g, const Mat2<T>& c) {
     return d;
 }
 
-/// d^2 value_i / (dw_j dw_k) of the tangential and prism terms, which are quadratic.
+/// d^2 value_i / (dw_j dw_k) of the tangential and prism terms that are quadratic.
 template <class T>
 T quadratic_second(const LensTerms& lens, int i, int j, int k) {
     const T p0 = T(lens.tangential.x), p1 = T(lens.tangential.y);
@@ -105,11 +105,48 @@ T quadratic_second(const LensTerms& lens, int i, int j, int k) {
     return (i == j ? 6 * own : 2 * own) + 2 * prism;
 }
 
+/// The tangential and prism terms at v, with d value_i / dv_j as [j][i]: the quadratic ones, and
+/// prism_high |v|^4.
+template <class T>
+struct Bend {
+    Vec2<T> value{0};
+    Mat2<T> jacobian{0};
+};
+template <class T>
+Bend<T> bend(const LensTerms& lens, const Vec2<T>& v) {
+    const T square = glm::dot(v, v);
+    const Vec2<T> high(lens.prism_high);
+    Bend<T> out{square * square * high, glm::outerProduct(high, 4 * square * v)};
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j)
+            for (int k = 0; k < 2; ++k) {
+                const T second = quadratic_second<T>(lens, i, j, k);
+                out.value[i] += second * v[j] * v[k] / 2;
+                out.jacobian[j][i] += second * v[k];
+            }
+    return out;
+}
+
+/// sum over i, j of c_ij d^2 value_i / (dv_j dv_k) of all these terms.
+template <class T>
+Vec2<T> bend_second(const LensTerms& lens, const Vec2<T>& v, const Mat2<T>& c) {
+    Vec2<T> d(0);
+    for (int k = 0; k < 2; ++k)
+        for (int i = 0; i < 2; ++i)
+            for (int j = 0; j < 2; ++j) {
+                const T high = T(lens.prism_high[i]) *
+                               (8 * v[j] * v[k] + (j == k ? 4 * glm::dot(v, v) : T(0)));
+                d[k] += c[j][i] * (quadratic_second<T>(lens, i, j, k) + high);
+            }
+    return d;
+}
+
 template <class T>
 struct Parts {
     Radial<T> front, plane;
-    Vec2<T> w{0};
-    Mat2<T> front_jacobian{1}, plane_jacobian{1};
+    Vec2<T> w{0}, bent{0};  // bent: where the terms of Bend are taken
+    Bend<T> bend;
+    Mat2<T> front_jacobian{1}, radial_jacobian{1}, plane_jacobian{1};
 };
 
 template <class T>
@@ -119,11 +156,11 @@ Parts<T> parts_at(const LensTerms& lens, const Vec2<T>& ray) {
     at.w = ray * at.front.value;
     at.plane = plane_factor(lens, glm::dot(at.w, at.w));
     at.front_jacobian = radial_jacobian(ray, at.front);
-    at.plane_jacobian = radial_jacobian(at.w, at.plane);
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j)
-            for (int k = 0; k < 2; ++k)
-                at.plane_jacobian[j][i] += quadratic_second<T>(lens, i, j, k) * at.w[k];
+    at.radial_jacobian = radial_jacobian(at.w, at.plane);
+    at.bent = lens.after ? at.w * at.plane.value : at.w;
+    at.bend = bend(lens, at.bent);
+    at.plane_jacobian = at.radial_jacobian +
+                        (lens.after ? at.bend.jacobian * at.radial_jacobian : at.bend.jacobian);
     return at;
 }
 
@@ -133,11 +170,7 @@ template <class T>
 LensPoint<T> lens_point(const LensTerms& lens, const Vec2<T>& ray) {
     const Parts<T> at = parts_at(lens, ray);
     LensPoint<T> out;
-    out.value = at.w * at.plane.value;
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j)
-            for (int k = 0; k < 2; ++k)
-                out.value[i] += quadratic_second<T>(lens, i, j, k) * at.w[j] * at.w[k] / 2;
+    out.value = at.w * at.plane.value + at.bend.value;
     out.jacobian = at.plane_jacobian * at.front_jacobian;
     out.seen = glm::dot(at.w, at.w) <= T(lens.fold * lens.fold);
     return out;
@@ -149,11 +182,13 @@ Vec2<T> lens_jacobian_backward(const LensTerms& lens, const Vec2<T>& ray,
     const Parts<T> at = parts_at(lens, ray);
     const Mat2<T> d_plane = d_jacobian * glm::transpose(at.front_jacobian);
     const Mat2<T> d_front = glm::transpose(at.plane_jacobian) * d_jacobian;
-    Vec2<T> d_w = radial_second(at.w, at.plane, d_plane);
-    for (int k = 0; k < 2; ++k)
-        for (int i = 0; i < 2; ++i)
-            for (int j = 0; j < 2; ++j)
-                d_w[k] += d_plane[j][i] * quadratic_second<T>(lens, i, j, k);
+    const Mat2<T>& radial = at.radial_jacobian;
+    Vec2<T> d_w(0);
+    if (lens.after)
+        d_w = radial_second(at.w, at.plane, d_plane + glm::transpose(at.bend.jacobian) * d_plane) +
+              glm::transpose(radial) * bend_second(lens, at.bent, d_plane * glm::transpose(radial));
+    else
+        d_w = radial_second(at.w, at.plane, d_plane) + bend_second(lens, at.bent, d_plane);
     return glm::transpose(at.front_jacobian) * d_w + radial_second(ray, at.front, d_front);
 }
 

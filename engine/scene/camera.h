@@ -13,15 +13,17 @@ namespace darb {
 /// a(r) = atan(front_tan r) / (front_scale r) (fisheye and FOV; w = u where front_scale is 0), or
 /// with a negative front_scale a(r) = 1 / (alpha sqrt(1 + beta r^2) + 1 - alpha), alpha =
 /// -front_scale and beta = front_tan (EUCM and the division models); then
-///   w' = w (1 + k0 s + .. + k3 s^4) / (1 + d0 s + d1 s^2 + d2 s^3), s = |w|^2,
-///        + tangential (2 p0 x y + p1 (s + 2 x^2), 2 p1 x y + p0 (s + 2 y^2)) + prism s.
+///   v = w (1 + k0 s + .. + k5 s^6) / (1 + d0 s + d1 s^2 + d2 s^3), s = |w|^2,
+///   w' = v + tangential (2 p0 x y + p1 (t + 2 x^2), 2 p1 x y + p0 (t + 2 y^2)) + prism t
+///        + prism_high t^2, with (x, y) = w or, with `after`, v, and t its squared length.
 /// Source: the camera models of COLMAP, see engine/data/lens_model.h.
 struct LensTerms {
     bool active = false;  // false: a pinhole
     double front_tan = 0, front_scale = 0;
-    std::array<double, 4> k{};
+    std::array<double, 6> k{};
     std::array<double, 3> d{};
-    glm::dvec2 tangential{0.0}, prism{0.0};
+    glm::dvec2 tangential{0.0}, prism{0.0}, prism_high{0.0};
+    bool after = false;
     double fold = 0;                        // largest |w| that the lens maps one to one
     glm::dvec2 ray_min{0.0}, ray_max{0.0};  // bounds of the rays of the frame
 };

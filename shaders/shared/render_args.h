@@ -92,6 +92,9 @@ struct CameraData {
     vec2 lens_prism;
     vec2 lens_front;
     float lens_fold;
+    vec2 lens_radial_high;
+    vec2 lens_prism_high;
+    uint lens_after;  // 1: tangential and prism act after the radial factor
     // Those of its shutter, read where that effect is on.
     vec3 shutter_turn;
     vec3 shutter_move;
@@ -159,7 +162,7 @@ struct UpsampleArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(CameraData) == 192);
+static_assert(sizeof(CameraData) == 212);
 static_assert(sizeof(FrameStatus) == 56);
 static_assert(sizeof(FrameGroups) == 24);
 }  // namespace darb::gpu

@@ -17,7 +17,7 @@ inline std::vector<std::pair<std::string, LensTerms>> test_lenses() {
     plain.ray_min = glm::dvec2(-0.7, -0.6);
     plain.ray_max = glm::dvec2(0.8, 0.5);
     LensTerms opencv = plain, full = plain, fisheye = plain, fov = plain, prism = plain,
-              unified = plain, division = plain;
+              unified = plain, division = plain, aria = plain;
     opencv.k = {-0.2, 0.06, 0, 0};
     opencv.tangential = glm::dvec2(0.01, -0.015);
     full.k = {0.3, -0.1, 0.02, 0};
@@ -31,6 +31,12 @@ inline std::vector<std::pair<std::string, LensTerms>> test_lenses() {
     prism.k = {-0.03, 0.01, -0.002, 0.0005};
     prism.tangential = glm::dvec2(0.004, 0.006);
     prism.prism = glm::dvec2(0.01, -0.02);
+    aria.front_tan = aria.front_scale = 1;
+    aria.k = {0.04, -0.03, 0.012, -0.006, 0.002, -0.0004};
+    aria.after = true;
+    aria.tangential = glm::dvec2(0.006, -0.004);
+    aria.prism = glm::dvec2(-0.01, 0.015);
+    aria.prism_high = glm::dvec2(0.008, -0.005);
     unified.front_scale = -0.6;  // -alpha
     unified.front_tan = 1.2;     // beta
     division.front_scale = -0.5;
@@ -42,7 +48,8 @@ inline std::vector<std::pair<std::string, LensTerms>> test_lenses() {
             {"FULL_OPENCV", full},
             {"OPENCV_FISHEYE", fisheye},
             {"FOV", fov},
-            {"THIN_PRISM_FISHEYE", prism}};
+            {"THIN_PRISM_FISHEYE", prism},
+            {"RAD_TAN_THIN_PRISM_FISHEYE", aria}};
 }
 
 }  // namespace darb::test
