@@ -27,8 +27,10 @@
 namespace darb {
 
 /// name: a file in engine/publish/page, such as "project.frag". Specialization constants in the
-/// source become constants, with the values given, or else as declared.
-std::string page_shader(std::string_view name, const SpecConstants& constants);
+/// source become constants, with the values given, or else as declared. stored: the file that takes
+/// the place of "stored.glsl".
+std::string page_shader(std::string_view name, const SpecConstants& constants,
+                        const std::string& stored);
 
 namespace {
 
@@ -63,16 +65,22 @@ std::string joined(std::initializer_list<const char*> names) {
     return out;
 }
 
-std::string script() {
-    return joined({"1_decode.js", "2_camera.js", "3_renderer.js", "4_viewer.js", "5_controls.js",
-                   "6_main.js"});
+/// What a page has beyond the least.
+struct PageParts {
+    bool streamed = false;
+};
+
+std::string script(const PageParts& parts) {
+    return joined({"0_scene.js"}) + (parts.streamed ? "" : joined({"1_decode.js"})) +
+           joined({"2_camera.js", "3_renderer.js", "4_viewer.js", "5_controls.js"}) +
+           (parts.streamed ? joined({"5_stream.js"}) : "") + joined({"6_main.js"});
 }
 
-std::string worker() {
-    return joined({"merger.js", "sorter.js"});
+std::string worker(const PageParts& parts) {
+    return (parts.streamed ? "" : joined({"merger.js"})) + joined({"sorter.js"});
 }
 
-Json shaders_of(const SplatModel& model) {
+Json shaders_of(const SplatModel& model, const PageParts& parts) {
     SpecConstants constants = kernel_constants(model.kernel, model.footprint);
     constants["SH_DEGREE"] = model.sh_degree;
     ProjectionEffects effects;
@@ -81,11 +89,12 @@ Json shaders_of(const SplatModel& model) {
     Json shaders = Json::object();
     for (const char* name :
          {"corner.vert", "project.frag", "splat.vert", "splat.frag", "show.frag"})
-        shaders[name] = page_shader(name, constants);
+        shaders[name] = page_shader(name, constants, parts.streamed ? "sog.glsl" : "arrays.glsl");
     return shaders;
 }
 
-Json camera_json(const View& view, const Subject& subject, const SplatModel& model) {
+Json camera_json(const View& view, const Subject& subject, const SplatModel& model,
+                 const glm::dvec3& origin) {
     const Camera& c = view.camera;
     const glm::dmat3 rows = glm::transpose(c.rotation);
     return {{"name", printable(view.name)},
@@ -95,14 +104,37 @@ Json camera_json(const View& view, const Subject& subject, const SplatModel& mod
             {"fy", c.fy},
             {"cx", c.cx},
             {"cy", c.cy},
-            {"eye", json_of(c.centre() - model.origin)},
+            {"eye", json_of(c.centre() - origin)},
             {"axes", {json_of(rows[0]), json_of(rows[1]), json_of(rows[2])}},
             {"pivot", pivot_depth(subject, model, c)}};
 }
 
-Json scene_json(const PageDocument& document, const SplatModel& model, const PageSplats& packed,
-                std::size_t payload_bytes) {
+/// origin: of the page's positions.
+Json scene_json(const PageDocument& document, const SplatModel& model, const PageParts& parts,
+                const glm::dvec3& origin) {
     const Subject subject = subject_of(model, cameras_of(document.views));
+    Json cameras = Json::array();
+    for (const View& view : document.views)
+        cameras.push_back(camera_json(view, subject, model, origin));
+    return {{"count", model.size()},
+            {"degree", model.sh_degree},
+            {"cameras", cameras},
+            {"start", document.start},
+            {"poster", document.start},
+            {"focus", json_of(subject.centre - origin)},
+            {"radius", subject.radius},
+            {"up", json_of(document.up)},
+            {"background", json_of(glm::dvec3(document.background))},
+            {"facts", document.facts},
+            {"near", NEAR_DEFAULT},
+            {"lowPass", LOW_PASS_DEFAULT},
+            {"jacobianMargin", JACOBIAN_MARGIN},
+            {"logitLimit", OPACITY_LOGIT_LIMIT},
+            {"secondMoment", rendered_second_moment(model.kernel, model.footprint)},
+            {"shaders", shaders_of(model, parts)}};
+}
+
+void add_payload(const PageSplats& packed, std::size_t payload_bytes, Json& scene) {
     Json columns = Json::array();
     for (const PageColumn& c : packed.columns) {
         Json column = {{"attribute", attribute_name(c.attribute)},
@@ -114,29 +146,14 @@ Json scene_json(const PageDocument& document, const SplatModel& model, const Pag
             column.update({{"low", c.low}, {"step", c.step}, {"difference", c.difference}});
         columns.push_back(column);
     }
-    Json cameras = Json::array();
-    for (const View& view : document.views) cameras.push_back(camera_json(view, subject, model));
-    return {{"count", packed.count},
-            {"degree", packed.sh_degree},
-            {"exact", packed.columns.front().exact},
-            {"columns", columns},
-            {"bytes", packed.planes.size()},
-            {"parts", (payload_bytes + kPayloadPart - 1) / kPayloadPart},
-            {"megabytes", std::round(static_cast<double>(payload_bytes) * 4 / 3 / 1e5) / 10},
-            {"cameras", cameras},
-            {"start", document.start},
-            {"poster", document.start},
-            {"focus", json_of(subject.centre - model.origin)},
-            {"radius", subject.radius},
-            {"up", json_of(document.up)},
-            {"background", json_of(glm::dvec3(document.background))},
-            {"facts", document.facts},
-            {"near", NEAR_DEFAULT},
-            {"lowPass", LOW_PASS_DEFAULT},
-            {"jacobianMargin", JACOBIAN_MARGIN},
-            {"logitLimit", OPACITY_LOGIT_LIMIT},
-            {"secondMoment", rendered_second_moment(model.kernel, model.footprint)},
-            {"shaders", shaders_of(model)}};
+    scene.update(
+        {{"count", packed.count},
+         {"degree", packed.sh_degree},
+         {"exact", packed.columns.front().exact},
+         {"columns", columns},
+         {"bytes", packed.planes.size()},
+         {"parts", (payload_bytes + kPayloadPart - 1) / kPayloadPart},
+         {"megabytes", std::round(static_cast<double>(payload_bytes) * 4 / 3 / 1e5) / 10}});
 }
 
 std::string style(const glm::vec3& background) {
@@ -147,30 +164,59 @@ std::string style(const glm::vec3& background) {
 
 }  // namespace
 
+namespace {
+
+/// The page up to its splats.
+std::string page_head(const PageDocument& document, const PageParts& parts, const Json& scene) {
+    DARB_CHECK(document.start < document.views.size(), "camera {}", document.start);
+    return filled(page_file(kFolder + "page.html"),
+                  {{"title", html_escape(printable(document.title))},
+                   {"may", parts.streamed ? "; connect-src 'self'" : ""},
+                   {"style", style(document.background)},
+                   {"poster", "data:image/jpeg;base64," + base64(document.poster)},
+                   {"scene", script_json(scene)},
+                   {"worker", worker(parts)},
+                   {"script", script(parts)}});
+}
+
+constexpr const char* kPageEnd = "</body>\n</html>\n";
+
+}  // namespace
+
 std::string page_document(const PageDocument& document, const SplatModel& model,
                           const PageSplats& packed) {
-    DARB_CHECK(packed.count > 0 && document.start < document.views.size(), "{} splats, camera {}",
-               packed.count, document.start);
+    DARB_CHECK(packed.count > 0, "{} splats", packed.count);
     const std::vector<std::byte> payload = gzip(packed.planes);
-    std::string page =
-        filled(page_file(kFolder + "page.html"),
-               {{"title", html_escape(printable(document.title))},
-                {"style", style(document.background)},
-                {"poster", "data:image/jpeg;base64," + base64(document.poster)},
-                {"scene", script_json(scene_json(document, model, packed, payload.size()))},
-                {"worker", worker()},
-                {"script", script()}});
+    const PageParts parts;
+    Json scene = scene_json(document, model, parts, model.origin);
+    add_payload(packed, payload.size(), scene);
+    std::string page = page_head(document, parts, scene);
     for (std::size_t at = 0, part = 0; at < payload.size(); at += kPayloadPart, ++part)
         page += fmt::format(
             "<script type=\"text/plain\" id=\"part{}\">{}</script>\n", part,
             base64(std::span(payload).subspan(at, std::min(kPayloadPart, payload.size() - at))));
-    return page + "</body>\n</html>\n";
+    return page + kPageEnd;
+}
+
+std::string streamed_page_document(const PageDocument& document, const SplatModel& model) {
+    const PageParts parts{.streamed = true};
+    return page_head(document, parts, scene_json(document, model, parts, glm::dvec3(0.0))) +
+           kPageEnd;
 }
 
 std::size_t page_script_bytes() {
-    std::size_t bytes = worker().size() + script().size();
-    for (const Json& shader : shaders_of(SplatModel{})) bytes += shader.dump().size();
+    std::size_t bytes = worker({}).size() + script({}).size();
+    for (const Json& shader : shaders_of(SplatModel{}, {})) bytes += shader.dump().size();
     return bytes;
+}
+
+std::size_t most_page_script_bytes() {
+    std::size_t most = 0;
+    for (const bool streamed : {false, true}) {
+        const PageParts all{.streamed = streamed};
+        most = std::max(most, worker(all).size() + script(all).size());
+    }
+    return most;
 }
 
 namespace {
@@ -225,6 +271,7 @@ std::string function_of(const std::string& line) {
 
 struct Source {
     const SpecConstants& constants;
+    const std::string& stored;
     std::set<std::string> included{};
     std::vector<Piece> pieces{};
 
@@ -254,7 +301,8 @@ struct Source {
             }
             const std::string path = line.substr(10, line.rfind('"') - 10);
             const bool beside = path.find('/') == std::string::npos;
-            add_file(path == "kernels/shaped.glsl" ? "engine/publish/page/shapeless.glsl"
+            add_file(path == "kernels/shaped.glsl" ? kFolder + "shapeless.glsl"
+                     : path == "stored.glsl"       ? kFolder + stored
                      : beside                      ? name.substr(0, name.rfind('/') + 1) + path
                                                    : "shaders/" + path);
         }
@@ -285,9 +333,10 @@ struct Source {
 
 }  // namespace
 
-std::string page_shader(std::string_view name, const SpecConstants& constants) {
-    Source source{constants};
-    source.add_file("engine/publish/page/" + std::string(name));
+std::string page_shader(std::string_view name, const SpecConstants& constants,
+                        const std::string& stored) {
+    Source source{constants, stored};
+    source.add_file(kFolder + std::string(name));
     return std::string(kPreamble) + source.text();
 }
 

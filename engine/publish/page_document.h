@@ -28,8 +28,15 @@ constexpr std::string_view kFirstPart = "<script type=\"text/plain\" id=\"part0\
 std::string page_document(const PageDocument& document, const SplatModel& model,
                           const PageSplats& packed);
 
-/// How many bytes of a document are script and shaders.
+/// A page without splats: it fetches those of streamed SOG, whose lod-meta.json lies beside it.
+/// model: the scene, of which the page takes kernel, footprint, anti-aliasing and degree of
+/// harmonics.
+std::string streamed_page_document(const PageDocument& document, const SplatModel& model);
+
+/// How many bytes of a document are script and shaders; and script alone, in a page that has all
+/// there is.
 std::size_t page_script_bytes();
+std::size_t most_page_script_bytes();
 
 // Text that is embedded in the script of an HTML page, where data must never end it.
 

@@ -78,6 +78,13 @@ std::string facts_text(const SplatModel& model, const WebPageFacts& facts) {
         DARB_VERSION);
 }
 
+std::vector<std::byte> poster_of(Device& device, const SplatModel& model,
+                                 const PageDocument& document) {
+    Renderer renderer(device, model);
+    const Camera camera = at_most(document.views[document.start].camera, kPosterWidth);
+    return encode_jpeg(to_8bit(renderer.render(camera, document.background)), kPosterQuality);
+}
+
 /// The page with the splats that were packed last.
 class FittedPage : public PictureOutput {
   public:
@@ -100,10 +107,7 @@ class FittedPage : public PictureOutput {
         facts_.level = fit.level;
         facts_.loss = fit.loss;
         const SplatModel shown = unpack_page_splats(packed_, source_);
-        Renderer renderer(device_, shown);
-        const Camera camera = at_most(document_.views[document_.start].camera, kPosterWidth);
-        document_.poster =
-            encode_jpeg(to_8bit(renderer.render(camera, document_.background)), kPosterQuality);
+        document_.poster = poster_of(device_, shown, document_);
         document_.facts = facts_text(source_, facts_);
         page_ = page_document(document_, shown, packed_);
         facts_.bytes = page_.size();
@@ -124,10 +128,8 @@ class FittedPage : public PictureOutput {
     WebPageFacts facts_;
 };
 
-}  // namespace
-
-std::string make_web_page(Device& device, const SplatModel& model, const WebPageOptions& options,
-                          WebPageFacts* facts) {
+/// What pages of every kind have of a scene: all but facts and poster.
+PageDocument document_of(const SplatModel& model, const WebPageOptions& options) {
     if (model.size() == 0)
         throw Error("web page", "the scene has no splats", "Choose another scene.");
     if (!model.shape.empty())
@@ -144,6 +146,14 @@ std::string make_web_page(Device& device, const SplatModel& model, const WebPage
                       : up_of_cameras(cameras_of(options.views)).value_or(glm::dvec3(0, -1, 0));
     document.views = bookmarks_of(options, model, document.up);
     document.start = start_of(options.start, document.views);
+    return document;
+}
+
+}  // namespace
+
+std::string make_web_page(Device& device, const SplatModel& model, const WebPageOptions& options,
+                          WebPageFacts* facts) {
+    PageDocument document = document_of(model, options);
     const PictureMeasure measure(device, model, document.views, options.background,
                                  options.progress);
     FittedPage page(device, model, document);
@@ -154,6 +164,28 @@ std::string make_web_page(Device& device, const SplatModel& model, const WebPage
         facts->script_bytes = page_script_bytes();
     }
     return page.take_page();
+}
+
+std::string make_streamed_page(Device& device, const SplatModel& model, SplatModel stored,
+                               std::size_t levels, const WebPageOptions& options,
+                               WebPageFacts* facts) {
+    if (options.exact || options.max_bytes > 0)
+        throw Error("web page", "values and sizes of a streamed scene are those of SOG",
+                    "Write one file, which ends in .html, or leave the option out.");
+    PageDocument document = document_of(model, options);
+    stored.kernel = model.kernel;
+    stored.footprint = model.footprint;
+    WebPageFacts found;
+    found.splats = stored.size();
+    found.loss = PictureMeasure(device, model, document.views, options.background, options.progress)
+                     .compare(stored);
+    document.facts = fmt::format("{} Streamed in {} levels.", facts_text(model, found), levels);
+    document.poster = poster_of(device, stored, document);
+    const std::string page = streamed_page_document(document, model);
+    found.bytes = page.size();
+    found.script_bytes = most_page_script_bytes();
+    if (facts) *facts = found;
+    return page;
 }
 
 std::string web_page_text(const WebPageFacts& facts) {

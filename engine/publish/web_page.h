@@ -43,6 +43,14 @@ struct WebPageFacts {
 std::string make_web_page(Device& device, const SplatModel& model, const WebPageOptions& options,
                           WebPageFacts* facts = nullptr);
 
+/// Makes the page of a scene in streamed SOG, which is to lie beside the scene's lod-meta.json.
+/// stored: what a reader gets of the finest level; its kernel, footprint and origin are ignored.
+/// levels: how many there are. Fills what the facts say of splats, sizes and loss. Throws Error as
+/// make_web_page, and for options that a streamed page has no place for: exact and max_bytes.
+std::string make_streamed_page(Device& device, const SplatModel& model, SplatModel stored,
+                               std::size_t levels, const WebPageOptions& options,
+                               WebPageFacts* facts = nullptr);
+
 /// One or two lines about the page, for a terminal.
 std::string web_page_text(const WebPageFacts& facts);
 

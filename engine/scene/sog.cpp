@@ -649,17 +649,16 @@ void write_harmonics(const SplatModel& model, const EncodeOptions& options, json
 
 }  // namespace
 
-EncodedSplats encode_sog_parts(const SplatModel& scene, const std::string& where,
+EncodedSplats encode_sog_parts(const SplatModel& model, const std::string& where,
                                const EncodeOptions& options) {
-    check_splat_shapes(scene);
-    if (scene.size() == 0)
+    check_splat_shapes(model);
+    if (model.size() == 0)
         throw Error(where, "SOG cannot store a scene without splats", "Write a PLY.");
-    if (scene.size() > kMostSide * kMostSide / 2)
+    if (model.size() > kMostSide * kMostSide / 2)
         throw Error(
             where,
-            fmt::format("{} splats are more than a WebP picture has pixels for", scene.size()),
+            fmt::format("{} splats are more than a WebP picture has pixels for", model.size()),
             "Write fewer splats, or a PLY.");
-    const SplatModel model = pick_splats(scene, chunk_order(scene, kChunkNeighbours));
     json meta = {{"version", 2},
                  {"asset", {{"generator", "darb " DARB_VERSION}}},
                  {"count", model.size()},
@@ -686,7 +685,8 @@ EncodedSplats encode_sog_parts(const SplatModel& scene, const std::string& where
 
 EncodedSplats encode_sog(const SplatModel& model, const std::string& where,
                          const EncodeOptions& options) {
-    EncodedSplats parts = encode_sog_parts(model, where, options);
+    EncodedSplats parts =
+        encode_sog_parts(pick_splats(model, chunk_order(model, kChunkNeighbours)), where, options);
     if (lower(where).ends_with("meta.json")) return parts;
     parts.beside.emplace(parts.beside.begin(), "meta.json", std::move(parts.file));
     return {make_sog_zip(parts.beside, where)};

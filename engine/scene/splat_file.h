@@ -114,7 +114,8 @@ struct EncodeOptions {
     AssignRows assign_rows;           // SOG's palette of harmonics; null: on the host
     std::vector<SplatModel> coarser;  // streamed SOG: levels below the scene itself; empty: made by
                                       // merging
-    ClusterProgress progress;         // for SOG's palettes, which take long; may be empty
+    std::size_t file_splats = 256 << 10;  // streamed SOG: most splats in a file, but for a leaf
+    ClusterProgress progress;             // for SOG's palettes, which take long; may be empty
 };
 /// How many precisions the format's writer offers for this scene; 1: there is no choice.
 int precisions_of(SplatFormat format, const SplatModel& model);

@@ -31,11 +31,10 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr int kMostLodDepth = 256;              // nesting of the JSON
-constexpr std::size_t kLeafSplats = 16 << 10;   // most splats in a leaf of the finest level
-constexpr std::size_t kFileSplats = 256 << 10;  // splats per file; a leaf is never split
-constexpr std::size_t kLeastLevel = 500;        // splats
-constexpr std::size_t kLeafNeighbours = 256;    // for chunk_order
+constexpr int kMostLodDepth = 256;             // nesting of the JSON
+constexpr std::size_t kLeafSplats = 16 << 10;  // most splats in a leaf of the finest level
+constexpr std::size_t kLeastLevel = 500;       // splats
+constexpr std::size_t kLeafNeighbours = 256;   // for chunk_order
 
 /// A range of rows in a file.
 struct LodRange {
@@ -263,7 +262,9 @@ json leaf_of(LodWriter& writer, const LodSplats& splats) {
     for (std::size_t level = 0; level < splats.size(); ++level) {
         if (splats[level].empty()) continue;
         std::vector<std::uint32_t>& filling = writer.filling[level];
-        if (filling.size() + splats[level].size() > kFileSplats) end_file(writer, level);
+        // A leaf is never split.
+        if (filling.size() + splats[level].size() > writer.options.file_splats)
+            end_file(writer, level);
         const std::string name = chunk_name(level, writer.files[level]);
         auto at = std::ranges::find(writer.filenames, json(name));
         if (at == writer.filenames.end()) {

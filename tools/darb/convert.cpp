@@ -249,7 +249,14 @@ void sort_names(ConvertFlags& flags) {
 
 SplatFormat checked_format(const ConvertFlags& flags) {
     const std::optional<SplatFormat> format = format_to_write(flags.output);
-    if (!format && !is_page(flags.output))
+    if (flags.page.web &&
+        (format || is_page(flags.output) || std::filesystem::is_regular_file(flags.output)))
+        throw Error(flags.output.string(), "is a file, and --web writes a folder",
+                    "Name a folder: darb convert SCENE out/ --web.");
+    if (flags.page.web && (!flags.levels.refine.empty() || flags.choices.max_bytes > 0))
+        throw Error(flags.choices.max_bytes > 0 ? "--max-size" : "--refine", "is not for --web",
+                    "Leave it out.");
+    if (!flags.page.web && !format && !is_page(flags.output))
         throw Error(flags.output.string(), "names no format that can be written",
                     "Let it end in .html, " + endings_to_write() + ".");
     check_page_options(flags.page, flags.output);
@@ -261,7 +268,7 @@ SplatFormat checked_format(const ConvertFlags& flags) {
                     "Leave out one of them.");
     if (is_page(flags.output) && flags.levels.asked())
         throw Error("web page", "has one level", "See --max-size.");
-    return format.value_or(SplatFormat::ply);
+    return flags.page.web ? SplatFormat::streamed_sog : format.value_or(SplatFormat::ply);
 }
 
 /// The cameras that are named, or some of those that the run left beside the scene, turned with it,
@@ -333,15 +340,45 @@ std::vector<View> bookmarks_for(const ConvertFlags& flags) {
     return views;
 }
 
-int convert_to_page(const SplatModel& model, const ConvertFlags& flags,
-                    const std::string& stated_up, const WrittenFiles& files, std::FILE* say) {
-    Device device(command_device(flags.choices.device));
-    std::vector<View> views = bookmarks_for(flags);
+/// The options of a page, with the up axis where it is known.
+PageFlags page_flags(const ConvertFlags& flags, const std::vector<View>& views,
+                     const std::string& stated_up) {
     PageFlags page = flags.page;
     page.max_bytes = flags.choices.max_bytes;
     const bool up_given = flags.edits.up != SceneEdits{}.up;
     if (up_given || (views.empty() && !stated_up.empty()))
         page.up = edited_axis(flags.edits, up_given ? flags.edits.up : stated_up);
+    return page;
+}
+
+int convert_to_web_folder(SplatModel& model, const ConvertFlags& flags,
+                          const std::string& stated_up, const Paths& inputs,
+                          const WrittenFiles& files, std::FILE* say) {
+    Device device(command_device(flags.choices.device));
+    std::vector<View> views = bookmarks_for(flags);
+    const PageFlags page = page_flags(flags, views, stated_up);
+    PaletteDevice palettes(flags.choices.device);
+    const WebFolder to{
+        flags.output,
+        flags.levels.asked() ? level_counts(flags.levels, model.size()) : web_levels(model.size()),
+        palettes.assign_rows(), [&](const Paths& outputs) {
+            refuse_to_overwrite_inputs(outputs, inputs, Replaces::all);
+            files.check(outputs);
+        }};
+    Paths written;
+    tell(say, "{}",
+         write_web_folder(device, model, page, scene_name(flags.files[0]), std::move(views), to,
+                          written));
+    files.wrote(written);
+    tell_paths(say == nullptr, {flags.output / "index.html"});
+    return 0;
+}
+
+int convert_to_page(const SplatModel& model, const ConvertFlags& flags,
+                    const std::string& stated_up, const WrittenFiles& files, std::FILE* say) {
+    Device device(command_device(flags.choices.device));
+    std::vector<View> views = bookmarks_for(flags);
+    const PageFlags page = page_flags(flags, views, stated_up);
     tell(say, "{}",
          write_page(device, model, page, scene_name(flags.files[0]), std::move(views),
                     flags.output));
@@ -393,11 +430,11 @@ int convert(ConvertFlags flags) {
     Paths inputs = together({files_of(flags.cameras), files_of(flags.levels.refine)});
     for (const std::filesystem::path& file : flags.files)
         inputs = together({inputs, files_of(file)});
-    refuse_to_overwrite_inputs({flags.output}, inputs, Replaces::all);
     const SplatFormat format = checked_format(flags);
+    if (!flags.page.web) refuse_to_overwrite_inputs({flags.output}, inputs, Replaces::all);
     const WrittenFiles files(sources, flags.force);
     const bool several = flags.levels.levels > 0 && format != SplatFormat::streamed_sog;
-    Paths first{flags.output};  // the outputs that are known already
+    Paths first{flags.page.web ? flags.output / "index.html" : flags.output};  // known already
     if (several) first.clear();
     for (int level = 1; several && level <= flags.levels.levels; ++level)
         first.push_back(level_file(flags.output, format, level));
@@ -407,6 +444,7 @@ int convert(ConvertFlags flags) {
     std::FILE* const say = flags.quiet ? nullptr : stream_beside(flags.output);
     std::string stated_up;
     SplatModel model = load_all(flags, device, say, stated_up);
+    if (flags.page.web) return convert_to_web_folder(model, flags, stated_up, inputs, files, say);
     if (is_page(flags.output)) return convert_to_page(model, flags, stated_up, files, say);
     return convert_to_scene(model, format, flags, inputs, files, device, say);
 }
@@ -422,7 +460,8 @@ void add_convert(CLI::App& app, Action& action) {
                      "IN OUT, or several scenes, which become one, and -o: splat files, or output "
                      "folders of darb train")
         ->required();
-    command->add_option("-o,--output", flags->output, "ends in .html, " + endings_to_write());
+    command->add_option("-o,--output", flags->output,
+                        "ends in .html, " + endings_to_write() + "; with --web a folder");
     command->add_flag("--force", flags->force,
                       "replace a file that darb did not write from the same scene");
     command

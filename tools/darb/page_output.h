@@ -6,20 +6,23 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
+#include "engine/scene/splat_file.h"
 #include "engine/scene/splat_model.h"
+#include "tools/darb/outputs.h"
 
 namespace darb {
 
 struct PageFlags {
     std::string title, start_camera, background = "black";
     std::uint64_t max_bytes = 0;
-    bool exact = false;
+    bool exact = false, web = false;
     // unit vector, world; absent: as the views are held, otherwise a guess
     std::optional<glm::dvec3> up;
 };
@@ -37,6 +40,20 @@ void check_page_options(const PageFlags& flags, const std::filesystem::path& out
 std::string write_page(Device& device, const SplatModel& model, const PageFlags& flags,
                        const std::string& title, std::vector<View> views,
                        const std::filesystem::path& output);
+
+/// A streamed scene in a folder: index.html, lod-meta.json, and a folder for each of its files.
+struct WebFolder {
+    std::filesystem::path folder;
+    std::vector<std::size_t> counts;          // splats of the levels below the scene, falling
+    AssignRows assign_rows;                   // as EncodeOptions has it
+    std::function<void(const Paths&)> check;  // throws where one of the files must not be written
+};
+/// The levels that a streamed scene has by default: quarters, down to a few thousand splats.
+std::vector<std::size_t> web_levels(std::size_t splats);
+/// Writes it and returns a line about it; `written` receives its files. As write_page.
+std::string write_web_folder(Device& device, SplatModel& model, const PageFlags& flags,
+                             const std::string& title, std::vector<View> views, const WebFolder& to,
+                             Paths& written);
 
 /// The views that open_cameras finds, at least one; empty where no cameras are named.
 std::vector<View> named_views(const std::filesystem::path& cameras);

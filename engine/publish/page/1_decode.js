@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: MIT
-const scene = JSON.parse(document.getElementById("scene").textContent);
-const nextFrame = () => new Promise(done => setTimeout(done, 0));
-
 const digits = new Uint8Array(128);
 [..."ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"].forEach((c, i) => { digits[c.charCodeAt(0)] = i; });
 
@@ -81,6 +78,13 @@ async function decode(progress) {
   }
   finish(splats);
   return splats;
+}
+
+async function openSplats(viewer) {
+  viewer.load(await decode(share => {
+    element("bar").style.width = 100 * share + "%";
+    element("loaded").textContent = `${Math.round(scene.megabytes * share * 10) / 10} of ${scene.megabytes} MB`;
+  }));
 }
 
 function finish({place, position, turn}) {

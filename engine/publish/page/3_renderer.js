@@ -10,7 +10,8 @@ class Renderer {
     this.canvas = canvas;
     const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     this.columns = Math.min(2048, most);
-    if (scene.count > most * this.columns) throw Error(`${scene.count} splats are too many for this device, which takes ${most * this.columns}`);
+    this.most = most * this.columns;
+    if (scene.columns && scene.count > this.most) throw Error(`${scene.count} splats are too many for this device, which takes ${this.most}`);
     const float = gl.getExtension("EXT_color_buffer_float"), half = float || gl.getExtension("EXT_color_buffer_half_float");
     const whole = float && gl.getExtension("EXT_float_blend");
     this.formats = {float32: whole && gl.RGBA32F, float16: half && gl.RGBA16F, unorm8: gl.RGBA8};
@@ -91,11 +92,16 @@ class Renderer {
     level.light = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGB16F, terms ? this.columns : 1, terms ? rows : 1, terms || 1);
     splats.light.forEach((layer, k) => this.fill(layer, 3, (row, width, height, values) =>
       gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, row, k, width, height, 1, gl.RGB, gl.FLOAT, values)));
-    level.projected = [0, 1].map(() => this.texture(gl.TEXTURE_2D, gl.RGBA32UI, this.columns, rows));
+    this.finishLevel(level);
+  }
+
+  finishLevel(level) {
+    const gl = this.gl;
+    level.projected = [0, 1].map(() => this.texture(gl.TEXTURE_2D, gl.RGBA32UI, this.columns, level.rows));
     level.projection = this.framebuffer(level.projected);
-    level.order = this.texture(gl.TEXTURE_2D, gl.R32UI, this.columns, rows);
+    level.order = this.texture(gl.TEXTURE_2D, gl.R32UI, this.columns, level.rows);
     const failure = gl.getError();
-    if (failure) throw Error(failure === gl.OUT_OF_MEMORY ? `${scene.count} splats do not fit into the memory of this device` : `WebGL error ${failure}`);
+    if (failure) throw Error(failure === gl.OUT_OF_MEMORY ? `${level.rows * this.columns} splats do not fit into the memory of this device` : `WebGL error ${failure}`);
     this.levels.push(level);
   }
 
@@ -164,15 +170,21 @@ class Renderer {
     this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
+  projectSplats(level) {
+    const gl = this.gl;
+    this.bind(this.project, ["place", "turn", "size", "tint"], level.inputs);
+    this.bind(this.project, ["light"], [level.light], gl.TEXTURE_2D_ARRAY, 4);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
   draw(camera, fine, at = 0) {
     const gl = this.gl, {width, height} = camera, target = this.target(width, height, fine), level = this.levels[at];
     gl.disable(gl.BLEND);
     gl.bindVertexArray(this.nothing);
     this.pass(level.projection, this.columns, level.rows, this.project);
     this.setCamera(this.project, camera);
-    this.bind(this.project, ["place", "turn", "size", "tint"], level.inputs);
-    this.bind(this.project, ["light"], [level.light], gl.TEXTURE_2D_ARRAY, 4);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    if (level.chunks) projectChunks(this, level);
+    else this.projectSplats(level);
 
     this.pass(target.framebuffer, width, height, this.blend);
     gl.clearColor(0, 0, 0, 1);

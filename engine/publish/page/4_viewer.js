@@ -13,7 +13,7 @@ class Viewer {
     this.worker = makeWorker();
     this.worker.onmessage = ({data}) => this.sorted(data);
     this.worker.onerror = event => say("Sorting failed: " + event.message);
-    this.number = 0;
+    this.number = this.version = 0;
     this.camera = copyCamera(scene.cameras[scene.start]);
     this.distance = this.camera.pivot;  // what orbiting turns about is so far ahead
     this.step = this.pace = this.frames = 0;
@@ -30,6 +30,7 @@ class Viewer {
 
   add(splats) {
     this.renderer.upload(splats);
+    this.begun = true;
     this.worker.postMessage({level: this.renderer.levels.length - 1, position: splats.position}, [splats.position.buffer]);
   }
 
@@ -37,7 +38,7 @@ class Viewer {
   makeLevels() {
     const splats = this.splats;
     this.splats = null;
-    if (scene.count < fewSplats) return;
+    if (!splats || scene.count < fewSplats) return;
     const worker = makeWorker();
     worker.onmessage = ({data}) => {
       try { this.add(data.splats); } catch { data.level = levelsBelow; }
@@ -63,30 +64,33 @@ class Viewer {
 
   changed() {
     this.moved = performance.now();
+    this.stream?.look();
     this.request();
   }
 
   request() {
-    if (this.renderer.levels.length && !this.requested && !this.held) this.requested = requestAnimationFrame(now => this.frame(now));
+    if (this.begun && !this.requested && !this.held) this.requested = requestAnimationFrame(now => this.frame(now));
   }
 
-  // One order is under way at a time; the camera it is for may have moved on when it comes.
+  // One order is under way at a time; the camera it is for may have moved on when it comes. ranges: of the splats of a
+  // streamed scene that are on show, first and count.
   sort(camera, level = 0) {
-    this.sorting = {...camera, level};
-    this.worker.postMessage({id: ++this.number, level, row: camera.axes[2], centre: camera.eye, near: scene.near});
+    this.sorting = {...camera, level, version: this.version};
+    this.worker.postMessage({id: ++this.number, level, row: camera.axes[2], centre: camera.eye, near: scene.near, ranges: this.ranges});
   }
 
   sorted({order}) {
     this.orderOf = this.sorting;
     this.renderer.setOrder(order, this.orderOf.level);
     this.sorting = null;
+    this.stream?.sorted(this.orderOf.version);
     this.wake?.();
     this.request();
   }
 
   sameOrder(camera, level) {
     const o = this.orderOf;
-    return o && o.level === level && o.eye.every((x, i) => x === camera.eye[i]) && o.axes[2].every((x, i) => x === camera.axes[2][i]);
+    return o && o.level === level && o.version === this.version && o.eye.every((x, i) => x === camera.eye[i]) && o.axes[2].every((x, i) => x === camera.axes[2][i]);
   }
 
   frame(now) {
@@ -138,6 +142,7 @@ class Viewer {
 
   // For tests and for pictures: this camera at its own size, in its own order. -> PNG as a data URL
   async picture(camera, level = 0) {
+    await this.stream?.settled(camera);
     this.held = true;
     try {
       while (this.sorting) await new Promise(done => { this.wake = done; });

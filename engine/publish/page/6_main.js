@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The panel, loading, and the hook for tests.
-const element = id => document.getElementById(id);
 const opened = performance.now();
 let viewer, place = scene.start, loadedAfter;
 
@@ -17,7 +16,7 @@ function fail(error) {
 function firstPicture() {
   loadedAfter = performance.now() - opened;
   element("poster").classList.add("gone");
-  element("loading").hidden = true;
+  element("loading").hidden = !viewer.stream?.missing;
 }
 
 function goTo(index) {
@@ -70,10 +69,7 @@ async function start() {
   if (place !== Number(scene.poster)) element("poster").hidden = true;
   wirePanel();
   addEventListener("hashchange", () => { cameraOfAddress(); goTo(place); });
-  viewer.load(await decode(share => {
-    element("bar").style.width = 100 * share + "%";
-    element("loaded").textContent = `${Math.round(scene.megabytes * share * 10) / 10} of ${scene.megabytes} MB`;
-  }));
+  await openSplats(viewer);
 }
 
 const ready = start();
@@ -85,7 +81,7 @@ window.darb = {
   ready, scene, fewSplats,
   // level: of splats, 0 has all; fine: at rest
   picture: async (camera, fine, level) => { await ready; viewer.fine = fine; return viewer.picture(cameraOf(camera), level); },
-  get state() { return {shown: !!viewer?.shown, loadedAfter, camera: viewer?.camera, distance: viewer?.distance, format: viewer?.format, place, step: viewer?.step, levels: viewer?.renderer.levels.length}; },
+  get state() { return {shown: !!viewer?.shown, loadedAfter, camera: viewer?.camera, distance: viewer?.distance, format: viewer?.format, place, step: viewer?.step, levels: viewer?.renderer.levels.length, ...viewer?.stream?.state}; },
   // Frames a second of a turn about the focus, and the step of `paces` it ends at.
   turn: async seconds => {
     await ready;

@@ -1,5 +1,6 @@
 // The page's twin of shaders/forward/project.comp: a texel a splat, by the same functions. Writes the mean and the
-// Cholesky factor, reach, colour and opacity; zeros for a splat that is not drawn.
+// Cholesky factor, reach, colour and opacity; zeros for a splat that is not drawn. Where a splat's values stand,
+// "stored.glsl" says, which is arrays.glsl in a page that holds its splats and sog.glsl in one that fetches them.
 #include "shared/render_args.h"
 #include "shared/attribute_list.h"
 
@@ -13,23 +14,20 @@ layout(constant_id = 1) const int SH_DEGREE = 0;
 #include "effects/camera_model.glsl"
 
 uniform CameraData camera;
-uniform float low_pass;        // px^2
-uniform sampler2D place;       // position, opacity
-uniform sampler2D turn;        // unit quaternion w x y z
-uniform sampler2D size;        // natural logarithms of the standard deviations
-uniform sampler2D tint;        // sh_dc
-uniform sampler2DArray light;  // sh_rest, a layer a coefficient
+uniform float low_pass;  // px^2
+
+#include "stored.glsl"
 
 layout(location = 0) out uvec4 splat_shape;  // mean, l11, l21
 layout(location = 1) out uvec4 splat_light;  // l22, opacity; rgb and sqrt(reach) as halves
 
 vec3 splat_colour(ivec2 at, vec3 direction) {
-    vec3 colour = 0.5 + SH_C0 * texelFetch(tint, at, 0).rgb;
+    vec3 colour = 0.5 + SH_C0 * stored_dc(at);
     if (SH_DEGREE > 0) {
         float basis[SH_REST_MAX];
         sh_basis(direction, basis);
         for (int k = 0; k < (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1; ++k)
-            colour += basis[k] * texelFetch(light, ivec3(at, k), 0).rgb;
+            colour += basis[k] * stored_rest(at, k);
     }
     return max(colour, 0.0);
 }
@@ -37,8 +35,9 @@ vec3 splat_colour(ivec2 at, vec3 direction) {
 void main() {
     splat_shape = uvec4(0u);
     splat_light = uvec4(0u);
-    const ivec2 at = ivec2(gl_FragCoord.xy);
-    const vec4 position = texelFetch(place, at, 0);
+    ivec2 at;
+    if (!stored_at(at)) return;
+    const vec4 position = stored_place(at);
     const vec3 to_splat = from_centre(camera, position.xyz);
     const vec3 p = to_camera(camera, to_splat);
     if (!magnitude_below(p, 1e30) || !(p.z > camera.near_plane)) return;
@@ -47,11 +46,11 @@ void main() {
     float reach = kernel_reach(opacity, 0.0);
     if (!(reach > 0.0)) return;
 
-    const vec3 s = exp(clamp(texelFetch(size, at, 0).xyz, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)) *
+    const vec3 s = exp(clamp(stored_size(at), -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)) *
         sqrt(kernel_covariance_scale(0.0));
     vec3 j0, j1;
     jacobian_rows(camera, p, j0, j1);
-    const mat3 axes = rotation_matrix(texelFetch(turn, at, 0));
+    const mat3 axes = rotation_matrix(stored_turn(at));
     const vec3 r1 = (to_world(camera, j0) * axes) * s;
     const vec3 r2 = (to_world(camera, j1) * axes) * s;
     const Factor f = cholesky_factor(r1, r2, low_pass);

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: MIT
 // The worker: splats by the depth of their centres, front to back, equal depths by their number. Another one merges.
-const levels = [];  // of splats: their positions, and room to sort
+const levels = [];  // of splats: their positions, and room to sort. A streamed scene has one, in which chunks come and go
 const counts = new Uint32Array(3 << 11);
 
-function sort({position, keys, other, order, otherOrder}, row, centre, near) {
-  const n = position.length / 3, depth = new Float32Array(keys.buffer);
+function sort({position, keys, other, order, otherOrder}, ranges, row, centre, near) {
+  const depth = new Float32Array(keys.buffer);
   const [a, b, c] = row, [x, y, z] = centre;
   let visible = 0;
   counts.fill(0);
-  for (let i = 0; i < n; ++i) {
+  for (let r = 0, i = 0, end = 0; r < ranges.length || i < end; ++i) {
+    if (i >= end) {
+      [i, end] = [ranges[r], ranges[r] + ranges[r + 1]];
+      r += 2;
+      if (i >= end) continue;
+    }
     const d = a * (position[3 * i] - x) + b * (position[3 * i + 1] - y) + c * (position[3 * i + 2] - z);
     if (!(d > near)) continue;
     depth[visible] = d;
@@ -42,11 +47,13 @@ onmessage = ({data}) => {
       splats = merged(splats, data);
       postMessage({level, splats});
     }
-  } else if (data.position) {
-    const n = data.position.length / 3, room = () => new Uint32Array(n);
-    levels[data.level] = {position: data.position, keys: room(), other: room(), order: room(), otherOrder: room()};
+  } else if (data.at !== undefined) {
+    levels[data.level].position.set(data.position, 3 * data.at);
+  } else if (data.position || data.room) {
+    const position = data.position || new Float32Array(3 * data.room), n = position.length / 3, room = () => new Uint32Array(n);
+    levels[data.level] = {position, keys: room(), other: room(), order: room(), otherOrder: room()};
   } else {
-    const order = sort(levels[data.level], data.row, data.centre, data.near);
+    const level = levels[data.level], order = sort(level, data.ranges || [0, level.keys.length], data.row, data.centre, data.near);
     postMessage({id: data.id, order}, [order.buffer]);
   }
 };

@@ -86,6 +86,42 @@ TEST_F(StreamedSog, levels_are_written_and_the_finest_is_read) {
     EXPECT_EQ(facts.notes.size(), 1u);
 }
 
+/// Checks that the rows that each leaf names lie within its box. Returns the number of leaves.
+int check_rows(const json& node, const std::vector<SplatModel>& files) {
+    int leaves = 0;
+    if (node.contains("children"))
+        for (const json& child : node["children"]) leaves += check_rows(child, files);
+    if (!node.contains("lods")) return leaves;
+    for (const auto& [level, lod] : node["lods"].items()) {
+        const SplatModel& file = files[lod["file"].get<size_t>()];
+        const size_t offset = lod["offset"], count = lod["count"];
+        for (size_t i = offset; i < offset + count; ++i)
+            for (int axis = 0; axis < 3; ++axis) {
+                const double x = position_of(file, i)[axis];
+                EXPECT_GE(x, node["bound"]["min"][axis].get<double>() - 1e-3) << i;
+                EXPECT_LE(x, node["bound"]["max"][axis].get<double>() + 1e-3) << i;
+                if (testing::Test::HasFailure()) return leaves;
+            }
+    }
+    return leaves + 1;
+}
+
+TEST_F(StreamedSog, rows_of_a_leaf_are_those_of_its_file) {
+    SplatModel model = sample_model(0, 40'000);
+    std::ranges::fill(model.log_scale, -7.0f);  // boxes of leaves hardly overlap
+    EncodeOptions options;
+    options.file_splats = 20'000;
+    write_encoded(folder_ / "lod-meta.json",
+                  encode_scene(SplatFormat::streamed_sog, model, "lod-meta.json", options));
+    const json said = meta();
+    std::vector<SplatModel> files;
+    for (const std::string name : said["filenames"])
+        files.push_back(load_splats(folder_ / fs::path(name).parent_path()));
+    ASSERT_GT(files.size(), 3u);
+    for (const SplatModel& file : files) EXPECT_LE(file.size(), 20'000u);
+    EXPECT_GT(check_rows(said["tree"], files), 3);
+}
+
 TEST_F(StreamedSog, levels_are_merged_where_none_are_given) {
     save_splats(folder_ / "lod-meta.json", SplatFormat::streamed_sog, sample_model(1, 4000));
     EXPECT_EQ(meta()["counts"], json({4000, 1000}));
