@@ -117,10 +117,9 @@ std::string stored_columns(std::span<const PageColumn> columns) {
     text += Columns::function("vec3 stored_size(ivec2 at)",
                               fmt::format("return {};", from.vector(kLogScale, 0, 3)));
     const std::string turn = from.vector(kRotation, 0, 4);
-    text += Columns::function("vec4 stored_turn(ivec2 at)",
-                              fmt::format("return {};", columns.front().exact
-                                                            ? turn
-                                                            : "whole_turn(" + turn + ")"));
+    text += Columns::function(
+        "vec4 stored_turn(ivec2 at)",
+        fmt::format("return {};", columns.front().exact ? turn : "whole_turn(" + turn + ")"));
     text += Columns::function("vec3 stored_dc(ivec2 at)",
                               fmt::format("return {};", from.vector(kShDc, 0, 3)));
     std::string rest = "vec3 sum = vec3(0.0);";

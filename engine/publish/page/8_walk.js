@@ -147,10 +147,10 @@ class Walker {
       this.standing = true;
       return;
     }
-    this.standing = false;
     // Beyond the collider there is nothing to fall on: stay.
-    if (ground.under(this.feet, 0, 1000) === -Infinity) { this.feet = before; this.fallen = 0; }
-    else this.feet[1] -= fall;
+    this.standing = ground.under(this.feet, 0, 1000) === -Infinity;
+    if (!this.standing) this.feet[1] -= fall;
+    else [this.feet, this.fallen] = [before, 0];
   }
 
   see() { this.viewer.camera.eye = this.ground.toScene(add(this.feet, [0, 1, 0], body.eye)); }
