@@ -13,9 +13,9 @@ import tempfile
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = ["--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-         "--disable-component-update", "--disable-sync", "--mute-audio", "--hide-scrollbars",
-         "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
-         "--remote-debugging-pipe"]
+         "--disable-component-update", "--disable-sync", "--mute-audio", "--hide-scrollbars", "--remote-debugging-pipe"]
+WITH_WEBGL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+WITHOUT_WEBGL = ["--disable-gpu", "--disable-3d-apis"]
 
 
 def find():
@@ -26,7 +26,7 @@ def find():
 class Browser:
     """One page. said: console messages and exceptions; requests: addresses that it asked for, without data: and blob:."""
 
-    def __init__(self, width=1280, height=720):
+    def __init__(self, width=1280, height=720, webgl=True):
         # The browser's helpers may still write there after it has ended.
         self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         read_end, self.write_to = os.pipe()
@@ -37,7 +37,7 @@ class Browser:
             os.dup2(reading, 3)
             os.dup2(writing, 4)
 
-        self.process = subprocess.Popen([find(), *FLAGS, f"--user-data-dir={self.profile.name}", "about:blank"],
+        self.process = subprocess.Popen([find(), *FLAGS, *(WITH_WEBGL if webgl else WITHOUT_WEBGL), f"--user-data-dir={self.profile.name}", "about:blank"],
                                         preexec_fn=renumber, close_fds=False, stdout=subprocess.DEVNULL,
                                         stderr=subprocess.DEVNULL)
         os.close(read_end)

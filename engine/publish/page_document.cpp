@@ -5,9 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
-#include <regex>
-#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,7 +16,9 @@
 #include "engine/data/camera_list.h"
 #include "engine/gpu/pipeline.h"
 #include "engine/kernels/kernel_profile.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/publish/page_files.h"
+#include "engine/publish/page_shader.h"
 #include "engine/raster/forward_options.h"
 #include "engine/raster/kernel_constants.h"
 #include "engine/report/html.h"
@@ -25,12 +26,6 @@
 #include "engine/scene/subject.h"
 
 namespace darb {
-
-/// name: a file in engine/publish/page, such as "project.frag". Specialization constants in the
-/// source become constants, with the values given, or else as declared. stored: the file that takes
-/// the place of "stored.glsl".
-std::string page_shader(std::string_view name, const SpecConstants& constants,
-                        const std::string& stored);
 
 namespace {
 
@@ -67,29 +62,39 @@ std::string joined(std::initializer_list<const char*> names) {
 
 /// What a page has beyond the least.
 struct PageParts {
-    bool streamed = false;
+    bool streamed = false, notes = false, collider = false, panorama = false;
 };
 
+PageParts parts_of(const PageDocument& document, bool streamed) {
+    return {streamed, !document.notes.empty(), document.collider.has_value(),
+            document.panorama.has_value()};
+}
+
 std::string script(const PageParts& parts) {
-    return joined({"0_scene.js"}) + (parts.streamed ? "" : joined({"1_decode.js"})) +
+    return joined({"0_scene.js"}) +
+           (parts.streamed ? std::string() : joined({"half.js", "1_decode.js"})) +
            joined({"2_camera.js", "3_renderer.js", "4_viewer.js", "5_controls.js"}) +
-           (parts.streamed ? joined({"5_stream.js"}) : "") + joined({"6_main.js"});
+           (parts.streamed ? joined({"5_stream.js"}) : "") +
+           (parts.notes ? joined({"7_notes.js"}) : "") +
+           (parts.collider ? joined({"8_walk.js"}) : "") +
+           (parts.panorama ? joined({"9_around.js"}) : "") + joined({"6_main.js"});
 }
 
 std::string worker(const PageParts& parts) {
-    return (parts.streamed ? "" : joined({"merger.js"})) + joined({"sorter.js"});
+    return (parts.streamed ? "" : joined({"half.js", "merger.js"})) + joined({"sorter.js"});
 }
 
-Json shaders_of(const SplatModel& model, const PageParts& parts) {
+Json shaders_of(const SplatModel& model, std::span<const PageColumn> columns) {
     SpecConstants constants = kernel_constants(model.kernel, model.footprint);
     constants["SH_DEGREE"] = model.sh_degree;
     ProjectionEffects effects;
     effects.antialias = model.antialias;
     add_constants(effects, constants);
+    const PageStorage storage{columns, kernel_has_shape(model.kernel) && !columns.empty()};
     Json shaders = Json::object();
     for (const char* name :
          {"corner.vert", "project.frag", "splat.vert", "splat.frag", "show.frag"})
-        shaders[name] = page_shader(name, constants, parts.streamed ? "sog.glsl" : "arrays.glsl");
+        shaders[name] = page_shader(name, constants, storage);
     return shaders;
 }
 
@@ -110,8 +115,8 @@ Json camera_json(const View& view, const Subject& subject, const SplatModel& mod
 }
 
 /// origin: of the page's positions.
-Json scene_json(const PageDocument& document, const SplatModel& model, const PageParts& parts,
-                const glm::dvec3& origin) {
+Json scene_json(const PageDocument& document, const SplatModel& model,
+                std::span<const PageColumn> columns, const glm::dvec3& origin) {
     const Subject subject = subject_of(model, cameras_of(document.views));
     Json cameras = Json::array();
     for (const View& view : document.views)
@@ -131,7 +136,58 @@ Json scene_json(const PageDocument& document, const SplatModel& model, const Pag
             {"jacobianMargin", JACOBIAN_MARGIN},
             {"logitLimit", OPACITY_LOGIT_LIMIT},
             {"secondMoment", rendered_second_moment(model.kernel, model.footprint)},
-            {"shaders", shaders_of(model, parts)}};
+            {"shaped", kernel_has_shape(model.kernel)},
+            {"shaders", shaders_of(model, columns)}};
+}
+
+Json collider_json(const PageCollider& collider, const glm::dvec3& origin) {
+    glm::dvec3 low(1e300), high(-1e300);
+    for (const glm::dvec3& p : collider.position) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    const glm::dvec3 step = glm::max((high - low) / 65535.0, glm::dvec3(1e-12));
+    std::vector<std::byte> bytes;
+    const auto put = [&](std::uint32_t value, int count) {
+        for (int b = 0; b < count; ++b) bytes.push_back(std::byte(value >> (8 * b) & 0xffu));
+    };
+    for (const glm::dvec3& p : collider.position)
+        for (int axis = 0; axis < 3; ++axis)
+            put(static_cast<std::uint32_t>(std::lround((p[axis] - low[axis]) / step[axis])), 2);
+    for (const auto& face : collider.face)
+        for (const std::uint32_t i : face) put(i, 4);
+    return {{"low", json_of(low - origin)},
+            {"step", json_of(step)},
+            {"vertices", collider.position.size()},
+            {"faces", collider.face.size()},
+            {"data", base64(bytes)},
+            {"metres", collider.metres_per_unit}};
+}
+
+/// What only some pages have: notes, ground to walk on, a picture all around.
+void add_extras(const PageDocument& document, const SplatModel& model, const glm::dvec3& origin,
+                Json& scene) {
+    if (!document.notes.empty()) {
+        const Subject subject = subject_of(model, cameras_of(document.views));
+        Json notes = Json::array();
+        for (const PageNote& note : document.notes) {
+            notes.push_back({{"at", json_of(note.at - origin)},
+                             {"title", note.title.empty() ? "Note" : note.title},
+                             {"text", note.text}});
+            if (note.view) {
+                Json camera = camera_json(*note.view, subject, model, origin);
+                camera["pivot"] = glm::distance(note.at, note.view->camera.centre());
+                notes.back()["camera"] = std::move(camera);
+            }
+        }
+        scene["notes"] = std::move(notes);
+    }
+    if (document.collider) scene["collider"] = collider_json(*document.collider, origin);
+    if (document.panorama) {
+        const glm::dmat3 rows = glm::transpose(document.panorama->rotation);
+        scene["around"] = {{"picture", "data:image/jpeg;base64," + base64(document.panorama->jpeg)},
+                           {"axes", {json_of(rows[0]), json_of(rows[1]), json_of(rows[2])}}};
+    }
 }
 
 void add_payload(const PageSplats& packed, std::size_t payload_bytes, Json& scene) {
@@ -139,10 +195,11 @@ void add_payload(const PageSplats& packed, std::size_t payload_bytes, Json& scen
     for (const PageColumn& c : packed.columns) {
         Json column = {{"attribute", attribute_name(c.attribute)},
                        {"component", c.component},
-                       {"bytes", c.bytes}};
-        if (c.exact)
-            column["exact"] = true;
-        else
+                       {"bytes", c.bytes},
+                       {"bits", c.bits},
+                       {"word", c.word},
+                       {"shift", c.shift}};
+        if (!c.exact)
             column.update({{"low", c.low}, {"step", c.step}, {"difference", c.difference}});
         columns.push_back(column);
     }
@@ -151,7 +208,7 @@ void add_payload(const PageSplats& packed, std::size_t payload_bytes, Json& scen
          {"degree", packed.sh_degree},
          {"exact", packed.columns.front().exact},
          {"columns", columns},
-         {"bytes", packed.planes.size()},
+         {"layers", (packed.words + 3) / 4},
          {"parts", (payload_bytes + kPayloadPart - 1) / kPayloadPart},
          {"megabytes", std::round(static_cast<double>(payload_bytes) * 4 / 3 / 1e5) / 10}});
 }
@@ -187,8 +244,9 @@ std::string page_document(const PageDocument& document, const SplatModel& model,
                           const PageSplats& packed) {
     DARB_CHECK(packed.count > 0, "{} splats", packed.count);
     const std::vector<std::byte> payload = gzip(packed.planes);
-    const PageParts parts;
-    Json scene = scene_json(document, model, parts, model.origin);
+    const PageParts parts = parts_of(document, false);
+    Json scene = scene_json(document, model, packed.columns, model.origin);
+    add_extras(document, model, model.origin, scene);
     add_payload(packed, payload.size(), scene);
     std::string page = page_head(document, parts, scene);
     for (std::size_t at = 0, part = 0; at < payload.size(); at += kPayloadPart, ++part)
@@ -199,9 +257,10 @@ std::string page_document(const PageDocument& document, const SplatModel& model,
 }
 
 std::string streamed_page_document(const PageDocument& document, const SplatModel& model) {
-    const PageParts parts{.streamed = true};
-    return page_head(document, parts, scene_json(document, model, parts, glm::dvec3(0.0))) +
-           kPageEnd;
+    const glm::dvec3 origin(0.0);
+    Json scene = scene_json(document, model, {}, origin);
+    add_extras(document, model, origin, scene);
+    return page_head(document, parts_of(document, true), scene) + kPageEnd;
 }
 
 std::size_t page_script_bytes() {
@@ -213,131 +272,10 @@ std::size_t page_script_bytes() {
 std::size_t most_page_script_bytes() {
     std::size_t most = 0;
     for (const bool streamed : {false, true}) {
-        const PageParts all{.streamed = streamed};
+        const PageParts all{streamed, true, true, true};
         most = std::max(most, worker(all).size() + script(all).size());
     }
     return most;
-}
-
-namespace {
-
-constexpr std::string_view kPreamble =
-    "#version 300 es\n"
-    "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
-    "precision highp sampler2DArray;\n"
-    "#define precise\n";  // which GLSL ES 3.00 does not know
-
-std::string constant_text(const SpecValue& value) {
-    if (const auto* integer = std::get_if<std::int32_t>(&value.value))
-        return fmt::format("{}", *integer);
-    std::string text = fmt::format("{:.9g}", std::get<float>(value.value));
-    if (text.find_first_of(".e") == std::string::npos) text += ".0";
-    return text;
-}
-
-/// A line without its comment and indentation. A constant inside a function becomes a variable,
-/// because in GLSL it may depend on more than constants, but not in ES.
-std::string plain_line(std::string line, bool& in_function) {
-    line.erase(std::min(line.find("//"), line.size()));
-    line.erase(line.find_last_not_of(" \t") + 1);
-    in_function = line.starts_with(' ');
-    line.erase(0, line.find_first_not_of(' '));
-    if (in_function && line.starts_with("const ")) line.erase(0, 6);
-    return line;
-}
-
-std::string specialized(const std::string& line, const SpecConstants& constants) {
-    static const std::regex declaration(R"(layout\(constant_id = \d+\) const (\w+) (\w+) = (.*);)");
-    std::smatch match;
-    if (!std::regex_match(line, match, declaration)) return line;
-    const auto found = std::find_if(constants.begin(), constants.end(), [&](const auto& given) {
-        return given.first.text() == match.str(2);
-    });
-    std::string value = found == constants.end() ? match.str(3) : constant_text(found->second);
-    return fmt::format("const {0} {1} = {0}({2});", match.str(1), match.str(2), value);
-}
-
-/// A function, or the text between functions, which has no name.
-struct Piece {
-    std::string name, text;
-};
-
-/// The name of the function whose definition begins with this line; empty where none does.
-std::string function_of(const std::string& line) {
-    static const std::regex head(R"(\w+ (\w+)\(.*[^;])");
-    std::smatch match;
-    return std::regex_match(line, match, head) ? match.str(1) : std::string();
-}
-
-struct Source {
-    const SpecConstants& constants;
-    const std::string& stored;
-    std::set<std::string> included{};
-    std::vector<Piece> pieces{};
-
-    void add_line(const std::string& line, bool in_function, bool& open) {
-        const std::string name = in_function || open ? std::string() : function_of(line);
-        if (!name.empty() || pieces.empty() || (!open && !pieces.back().name.empty()))
-            pieces.push_back({name, {}});
-        if (!name.empty()) open = true;
-        pieces.back().text += specialized(line, constants) + "\n";
-        if (open && !in_function && line.ends_with('}')) open = false;
-    }
-
-    void add_file(const std::string& name) {
-        if (!included.insert(name).second) return;
-        std::string_view rest = page_file(name);
-        bool open = false;  // inside a function
-        while (!rest.empty()) {
-            const std::size_t end = rest.find('\n');
-            bool in_function = false;
-            const std::string line = plain_line(std::string(rest.substr(0, end)), in_function);
-            rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
-            if (line.empty() || line.starts_with("#version") || line.starts_with("#extension"))
-                continue;
-            if (!line.starts_with("#include \"")) {
-                add_line(line, in_function, open);
-                continue;
-            }
-            const std::string path = line.substr(10, line.rfind('"') - 10);
-            const bool beside = path.find('/') == std::string::npos;
-            add_file(path == "kernels/shaped.glsl" ? kFolder + "shapeless.glsl"
-                     : path == "stored.glsl"       ? kFolder + stored
-                     : beside                      ? name.substr(0, name.rfind('/') + 1) + path
-                                                   : "shaders/" + path);
-        }
-    }
-
-    /// The text without functions that are never called.
-    std::string text() const {
-        std::set<std::string> words{"main"};
-        std::vector<bool> kept(pieces.size(), false);
-        for (bool more = true; more;) {
-            more = false;
-            for (std::size_t i = 0; i < pieces.size(); ++i) {
-                if (kept[i] || !(pieces[i].name.empty() || words.contains(pieces[i].name)))
-                    continue;
-                kept[i] = more = true;
-                static const std::regex word(R"(\w+)");
-                const std::string& t = pieces[i].text;
-                for (std::sregex_iterator w(t.begin(), t.end(), word), end; w != end; ++w)
-                    words.insert(w->str());
-            }
-        }
-        std::string out;
-        for (std::size_t i = 0; i < pieces.size(); ++i)
-            if (kept[i]) out += pieces[i].text;
-        return out;
-    }
-};
-
-}  // namespace
-
-std::string page_shader(std::string_view name, const SpecConstants& constants,
-                        const std::string& stored) {
-    Source source{constants, stored};
-    source.add_file(kFolder + std::string(name));
-    return std::string(kPreamble) + source.text();
 }
 
 std::string script_json(const nlohmann::json& value) {

@@ -2,15 +2,32 @@
 // Assembles the document of a web page from its parts: text, script, shaders, splats.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "engine/data/dataset.h"
+#include "engine/publish/page_notes.h"
 #include "engine/publish/page_splats.h"
 
 namespace darb {
+
+/// What one walks on in a page: triangles, in world units and axes.
+struct PageCollider {
+    std::vector<glm::dvec3> position;
+    std::vector<std::array<std::uint32_t, 3>> face;  // indices of positions
+    double metres_per_unit = 0;                      // 0: a unit counts as a metre
+};
+
+/// All directions around a place: a picture as engine/scene/panorama.h has it.
+struct PagePanorama {
+    std::vector<std::byte> jpeg;
+    glm::dmat3 rotation{1.0};  // of the world into the panorama's frame
+};
 
 struct PageDocument {
     std::string title, facts;
@@ -19,6 +36,9 @@ struct PageDocument {
     glm::dvec3 up{0, -1, 0};  // world
     glm::vec3 background{0.0f};
     std::vector<std::byte> poster;  // JPEG that shows views[start]
+    std::vector<PageNote> notes;
+    std::optional<PageCollider> collider;
+    std::optional<PagePanorama> panorama;  // from the place of views[start]
 };
 
 /// The offset in a document at which the splats begin.

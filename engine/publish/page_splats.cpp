@@ -63,7 +63,34 @@ std::vector<std::byte> planes_of(const std::vector<std::uint32_t>& integers, int
     return planes;
 }
 
+/// Bits of one number that the page's memory needs.
+int bits_of(const PageColumn& column, const std::vector<std::uint32_t>& integers) {
+    if (column.exact) return column.attribute == kShRest ? 16 : 32;
+    std::uint32_t any = 1;
+    for (const std::uint32_t v : integers) any |= v;
+    return static_cast<int>(std::bit_width(any));
+}
+
+/// Columns fill words in their order, and none stands in two.
+void place_in_words(PageSplats& packed) {
+    int used = 32;  // bits of the last word
+    for (PageColumn& column : packed.columns) {
+        if (column.attribute == kPosition) {
+            column.word = column.component;
+            continue;
+        }
+        if (used + column.bits > 32) {
+            ++packed.words;
+            used = 0;
+        }
+        column.word = packed.words - 1;
+        column.shift = used;
+        used += column.bits;
+    }
+}
+
 void add_integers(PageColumn column, const std::vector<std::uint32_t>& integers, PageSplats& to) {
+    column.bits = bits_of(column, integers);
     column.bytes = column.exact ? 4 : bytes_of(integers);
     std::vector<std::byte> planes;
     if (!column.exact) {
@@ -114,7 +141,8 @@ double typical_size(const SplatModel& model) {
 void pack_rounded(const SplatModel& model, const PagePrecision& p, PageSplats& to) {
     const double position_step = std::max(p.position * typical_size(model), 1e-12);
     const std::array<double, kAttributeCount> steps = {
-        position_step, p.log_scale, p.rotation, p.opacity, p.colour / kShBand0, p.harmonics};
+        position_step,       p.log_scale, p.rotation, p.opacity,
+        p.colour / kShBand0, p.harmonics, p.shape};
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& values = attribute_values(model, a);
         const std::size_t floats = model.floats(a);
@@ -196,7 +224,8 @@ PagePrecision page_precision(int level, int kernel) {
             .rotation = share / (jumps ? 500 : 100),
             .opacity = share / 255,
             .colour = share / 255,
-            .harmonics = share / 64};
+            .harmonics = share / 64,
+            .shape = share / 128};
 }
 
 PageSplats pack_page_splats(const SplatModel& model, const PagePrecision& precision) {
@@ -215,6 +244,7 @@ PageSplats pack_page_splats(const SplatModel& model, const PagePrecision& precis
         pack_exact(kept, packed);
     else
         pack_rounded(pick_splats(kept, chunk_order(kept, kChunk)), precision, packed);
+    place_in_words(packed);
     return packed;
 }
 
@@ -228,7 +258,8 @@ SplatModel unpack_page_splats(const PageSplats& packed, const SplatModel& like) 
         const std::vector<std::uint32_t> integers = integers_at(packed, column, at);
         at += packed.count * static_cast<std::size_t>(column.bytes);
         std::vector<float>& values = attribute_values(model, column.attribute);
-        const std::size_t floats = model.floats(column.attribute);
+        const std::size_t floats = attribute_floats(column.attribute, packed.sh_degree);
+        values.resize(floats * packed.count);  // an optional one is empty
         exact = column.exact;
         for (std::size_t i = 0; i < packed.count; ++i) {
             const double v = column.low + column.step * integers[i];

@@ -21,6 +21,7 @@ struct PagePrecision {
     double rotation = 0;             // for each component of the unit quaternion
     double opacity = 0, colour = 0;  // both 0 to 1
     double harmonics = 0;            // for coefficients above the first
+    double shape = 0;                // what a splat learns of its own, see shaped_kernel.h
 };
 
 /// Level 0 is the coarsest; each level halves the steps of the one before; kPageLevels and above
@@ -38,6 +39,9 @@ struct PageColumn {
     double low = 0, step = 1;
     bool difference = false;  // integers are zigzag-coded differences from the splat before
     bool exact = false;
+    // Where the page's shaders have it: of the words of a splat, and of the bits of that word. The
+    // first three words are the position in float32; harmonics in float32 become halves.
+    int bits = 32, word = 0, shift = 0;
 };
 
 struct PageSplats {
@@ -45,6 +49,7 @@ struct PageSplats {
     int sh_degree = 0;
     std::vector<PageColumn> columns;
     std::vector<std::byte> planes;  // all columns, in order
+    int words = 3;                  // of 32 bits, of a splat in the page's memory
 };
 
 /// Leaves out splats that are never drawn: those with NaN, without a rotation, or with an opacity

@@ -17,6 +17,7 @@
 #include "engine/render/renderer.h"
 #include "engine/report/html.h"
 #include "engine/scene/camera.h"
+#include "engine/scene/panorama.h"
 #include "engine/scene/splat_model.h"
 #include "engine/scene/subject.h"
 
@@ -25,6 +26,7 @@ namespace darb {
 namespace {
 
 constexpr int kPosterWidth = 800, kPosterQuality = 75;                 // px, of 100
+constexpr int kPanoramaWidth = 2048;                                   // px
 constexpr int kOrbitViews = 8, kOrbitWidth = 960, kOrbitHeight = 720;  // px
 
 std::vector<View> bookmarks_of(const WebPageOptions& options, const SplatModel& model,
@@ -85,6 +87,26 @@ std::vector<std::byte> poster_of(Device& device, const SplatModel& model,
     return encode_jpeg(to_8bit(renderer.render(camera, document.background)), kPosterQuality);
 }
 
+/// From where the first camera stands, upright, with what it looks at in the middle.
+PagePanorama panorama_of(Device& device, const SplatModel& model, const PageDocument& document) {
+    Camera pose = document.views[document.start].camera;
+    const glm::dvec3 centre = pose.centre(), down = -glm::normalize(document.up);
+    const glm::dmat3 rows = glm::transpose(pose.rotation);
+    glm::dvec3 ahead = rows[2] - down * glm::dot(rows[2], down);
+    if (glm::length(ahead) < 1e-3) ahead = rows[1] - down * glm::dot(rows[1], down);
+    ahead = glm::normalize(ahead);
+    pose.rotation = glm::transpose(glm::dmat3(glm::cross(down, ahead), down, ahead));
+    pose.translation = -(pose.rotation * centre);
+    Renderer renderer(device, model);
+    std::array<ImageF, kCubeFaces> faces;
+    for (std::size_t f = 0; f < faces.size(); ++f)
+        faces[f] = renderer.render(
+            face_camera(pose, cube_faces()[f], face_size(kPanoramaWidth), kJoinMargin),
+            document.background);
+    const ImageF joined = join_faces(faces, kPanoramaWidth, kPanoramaWidth / 2);
+    return {encode_jpeg(to_8bit(joined), kPosterQuality), pose.rotation};
+}
+
 /// The page with the splats that were packed last.
 class FittedPage : public PictureOutput {
   public:
@@ -132,11 +154,6 @@ class FittedPage : public PictureOutput {
 PageDocument document_of(const SplatModel& model, const WebPageOptions& options) {
     if (model.size() == 0)
         throw Error("web page", "the scene has no splats", "Choose another scene.");
-    if (!model.shape.empty())
-        throw Error("web page",
-                    fmt::format("cannot store the shape that each splat of the kernel {} has",
-                                kernel_name(model.kernel)),
-                    "Write the nearest Gaussians: darb convert --kernel gaussian.");
     PageDocument document;
     document.title = options.title;
     document.background = options.background;
@@ -146,6 +163,8 @@ PageDocument document_of(const SplatModel& model, const WebPageOptions& options)
                       : up_of_cameras(cameras_of(options.views)).value_or(glm::dvec3(0, -1, 0));
     document.views = bookmarks_of(options, model, document.up);
     document.start = start_of(options.start, document.views);
+    document.notes = options.notes;
+    document.collider = options.collider;
     return document;
 }
 
@@ -154,6 +173,7 @@ PageDocument document_of(const SplatModel& model, const WebPageOptions& options)
 std::string make_web_page(Device& device, const SplatModel& model, const WebPageOptions& options,
                           WebPageFacts* facts) {
     PageDocument document = document_of(model, options);
+    if (options.panorama) document.panorama = panorama_of(device, model, document);
     const PictureMeasure measure(device, model, document.views, options.background,
                                  options.progress);
     FittedPage page(device, model, document);
@@ -172,6 +192,11 @@ std::string make_streamed_page(Device& device, const SplatModel& model, SplatMod
     if (options.exact || options.max_bytes > 0)
         throw Error("web page", "values and sizes of a streamed scene are those of SOG",
                     "Write one file, which ends in .html, or leave the option out.");
+    if (!model.shape.empty())
+        throw Error("web page",
+                    fmt::format("SOG cannot store the shape that each splat of the kernel {} has",
+                                kernel_name(model.kernel)),
+                    "Write one file, which ends in .html, or add --kernel gaussian.");
     PageDocument document = document_of(model, options);
     stored.kernel = model.kernel;
     stored.footprint = model.footprint;
@@ -181,6 +206,7 @@ std::string make_streamed_page(Device& device, const SplatModel& model, SplatMod
                      .compare(stored);
     document.facts = fmt::format("{} Streamed in {} levels.", facts_text(model, found), levels);
     document.poster = poster_of(device, stored, document);
+    if (options.panorama) document.panorama = panorama_of(device, stored, document);
     const std::string page = streamed_page_document(document, model);
     found.bytes = page.size();
     found.script_bytes = most_page_script_bytes();

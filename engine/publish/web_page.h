@@ -12,6 +12,7 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "engine/publish/fit_pictures.h"
+#include "engine/publish/page_document.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
@@ -25,6 +26,9 @@ struct WebPageOptions {
     bool exact = false;           // float32; else the coarsest precision that reaches kEnoughDb
     std::uint64_t max_bytes = 0;  // splats are merged until the file fits; 0: no limit
     PictureMeasure::Progress progress = {};  // while pictures are measured; may be empty
+    std::vector<PageNote> notes = {};
+    std::optional<PageCollider> collider = {};
+    bool panorama = false;  // also a picture of all directions from the first camera
 };
 
 struct WebPageFacts {

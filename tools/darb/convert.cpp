@@ -45,6 +45,8 @@ void add_edit_options(CLI::App& app, SceneEdits& edits);
 void edit_scene(const SceneEdits& edits, SplatModel& model, std::FILE* say);
 /// Moves the cameras so that they see the edited scene as before: up, rotate, scale, translate.
 void edit_views(const SceneEdits& edits, std::vector<View>& views);
+/// What happens to the scene: up, rotate, scale, translate.
+Similarity similarity_of(const SceneEdits& edits);
 /// Where an axis of the original scene, named as for --up, points in the edited one. Unit vector.
 glm::dvec3 edited_axis(const SceneEdits& edits, const std::string& axis);
 
@@ -345,6 +347,7 @@ PageFlags page_flags(const ConvertFlags& flags, const std::vector<View>& views,
                      const std::string& stated_up) {
     PageFlags page = flags.page;
     page.max_bytes = flags.choices.max_bytes;
+    page.moved = similarity_of(flags.edits);
     const bool up_given = flags.edits.up != SceneEdits{}.up;
     if (up_given || (views.empty() && !stated_up.empty()))
         page.up = edited_axis(flags.edits, up_given ? flags.edits.up : stated_up);
@@ -427,7 +430,8 @@ int convert(ConvertFlags flags) {
     check_level_options(flags.levels);
     Paths sources;  // the files that decide whether an output is darb's to replace
     for (const std::filesystem::path& file : flags.files) sources.push_back(file);
-    Paths inputs = together({files_of(flags.cameras), files_of(flags.levels.refine)});
+    Paths inputs = together({files_of(flags.cameras), files_of(flags.levels.refine),
+                             Paths{flags.page.notes, flags.page.collider}});
     for (const std::filesystem::path& file : flags.files)
         inputs = together({inputs, files_of(file)});
     const SplatFormat format = checked_format(flags);
@@ -506,7 +510,16 @@ glm::dvec3 vector_of(const std::string& option, const std::string& text) {
     return {v[0], v[1], v[2]};
 }
 
-/// The similarity of up, then rotate, then scale, then translate.
+// A user who drops everything meant something else.
+void report_dropped(std::FILE* say, const std::string& option, size_t count, size_t left) {
+    if (count > 0 && left == 0)
+        throw Error(option, fmt::format("keeps none of {} splats", count),
+                    "`darb info` prints where the splats are and how opaque.");
+    if (count > 0) tell(say, "{}: {} splats left out\n", option, count);
+}
+
+}  // namespace
+
 Similarity similarity_of(const SceneEdits& edits) {
     Similarity similarity;
     similarity.scale = edits.scale;
@@ -517,16 +530,6 @@ Similarity similarity_of(const SceneEdits& edits) {
         similarity.translation = vector_of("--translate", edits.translate);
     return similarity;
 }
-
-// A user who drops everything meant something else.
-void report_dropped(std::FILE* say, const std::string& option, size_t count, size_t left) {
-    if (count > 0 && left == 0)
-        throw Error(option, fmt::format("keeps none of {} splats", count),
-                    "`darb info` prints where the splats are and how opaque.");
-    if (count > 0) tell(say, "{}: {} splats left out\n", option, count);
-}
-
-}  // namespace
 
 void edit_scene(const SceneEdits& edits, SplatModel& model, std::FILE* say) {
     const Similarity similarity = similarity_of(edits);
@@ -548,13 +551,7 @@ void edit_scene(const SceneEdits& edits, SplatModel& model, std::FILE* say) {
 
 void edit_views(const SceneEdits& edits, std::vector<View>& views) {
     const Similarity similarity = similarity_of(edits);
-    for (View& view : views) {
-        // distances grow with the scene, so that pictures stay the same
-        Camera& camera = view.camera;
-        camera.rotation = camera.rotation * glm::transpose(similarity.turn);
-        camera.translation =
-            similarity.scale * camera.translation - camera.rotation * similarity.translation;
-    }
+    for (View& view : views) move_camera(similarity, view.camera);
 }
 
 glm::dvec3 edited_axis(const SceneEdits& edits, const std::string& axis) {

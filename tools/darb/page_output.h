@@ -13,16 +13,27 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
+#include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/splat_model.h"
 #include "tools/darb/outputs.h"
 
 namespace darb {
 
+/// Where a point of a scene goes when the scene is moved.
+inline glm::dvec3 moved_point(const Similarity& similarity, const glm::dvec3& point) {
+    return similarity.scale * (similarity.turn * point) + similarity.translation;
+}
+/// Moves a camera along with the scene: it sees the same, and distances grow with the scene.
+void move_camera(const Similarity& similarity, Camera& camera);
+
 struct PageFlags {
     std::string title, start_camera, background = "black";
     std::uint64_t max_bytes = 0;
     bool exact = false, web = false;
+    std::filesystem::path notes, collider;
+    std::string walk, poster = "still";
+    Similarity moved;  // of the scene, which notes and the collider are turned with
     // unit vector, world; absent: as the views are held, otherwise a guess
     std::optional<glm::dvec3> up;
 };

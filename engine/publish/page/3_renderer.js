@@ -79,25 +79,19 @@ class Renderer {
     return quads;
   }
 
-  upload(splats) {
-    const gl = this.gl, rows = Math.max(1, Math.ceil(splats.place.length / 4 / this.columns)), terms = splats.light.length;
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    const level = {rows, count: 0};  // count: of the order
-    level.inputs = ["place", "turn", "size", "tint"].map(name => {
-      const texture = this.texture(gl.TEXTURE_2D, gl.RGBA32F, this.columns, rows);
-      this.fill(splats[name], 4, (row, width, height, values) =>
-        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, height, gl.RGBA, gl.FLOAT, values));
-      return texture;
-    });
-    level.light = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGB16F, terms ? this.columns : 1, terms ? rows : 1, terms || 1);
-    splats.light.forEach((layer, k) => this.fill(layer, 3, (row, width, height, values) =>
-      gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, row, k, width, height, 1, gl.RGB, gl.FLOAT, values)));
+  // layers: of four words a splat.
+  upload({layers}) {
+    const gl = this.gl, rows = Math.max(1, Math.ceil(layers[0].length / 4 / this.columns)), level = {rows, count: 0};  // count: of the order
+    level.words = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGBA32UI, this.columns, rows, layers.length);
+    layers.forEach((layer, k) => this.fill(layer, 4, (row, width, height, values) =>
+      gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, row, k, width, height, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, values)));
     this.finishLevel(level);
   }
 
   finishLevel(level) {
     const gl = this.gl;
-    level.projected = [0, 1].map(() => this.texture(gl.TEXTURE_2D, gl.RGBA32UI, this.columns, level.rows));
+    const formats = [gl.RGBA32UI, gl.RGBA32UI, ...scene.shaped ? [gl.R32UI] : []];
+    level.projected = formats.map(format => this.texture(gl.TEXTURE_2D, format, this.columns, level.rows));
     level.projection = this.framebuffer(level.projected);
     level.order = this.texture(gl.TEXTURE_2D, gl.R32UI, this.columns, level.rows);
     const failure = gl.getError();
@@ -151,11 +145,11 @@ class Renderer {
     gl.uniform1f(program.at("low_pass"), scene.lowPass);
   }
 
-  bind(program, names, textures, target = this.gl.TEXTURE_2D, first = 0) {
+  bind(program, names, textures, target = this.gl.TEXTURE_2D) {
     names.forEach((name, i) => {
-      this.gl.activeTexture(this.gl.TEXTURE0 + first + i);
+      this.gl.activeTexture(this.gl.TEXTURE0 + i);
       this.gl.bindTexture(target, textures[i]);
-      this.gl.uniform1i(program.at(name), first + i);
+      this.gl.uniform1i(program.at(name), i);
     });
   }
 
@@ -172,8 +166,7 @@ class Renderer {
 
   projectSplats(level) {
     const gl = this.gl;
-    this.bind(this.project, ["place", "turn", "size", "tint"], level.inputs);
-    this.bind(this.project, ["light"], [level.light], gl.TEXTURE_2D_ARRAY, 4);
+    this.bind(this.project, ["words"], [level.words], gl.TEXTURE_2D_ARRAY);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
@@ -192,7 +185,7 @@ class Renderer {
     gl.enable(gl.BLEND);
     gl.blendFuncSeparate(gl.DST_ALPHA, gl.ONE, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA);
     gl.bindVertexArray(this.quads);
-    this.bind(this.blend, ["shapes", "lights", "order"], [...level.projected, level.order]);
+    this.bind(this.blend, ["order", "shapes", "lights", "exponents"].slice(0, level.projected.length + 1), [level.order, ...level.projected]);
     gl.uniform1i(this.blend.at("batch"), batch);
     gl.uniform1i(this.blend.at("count"), level.count);
     gl.uniform2f(this.blend.at("frame"), width, height);

@@ -44,8 +44,8 @@ class Viewer {
       try { this.add(data.splats); } catch { data.level = levelsBelow; }
       if (data.level === levelsBelow) worker.terminate();
     };
-    worker.postMessage({merge: splats, levels: levelsBelow, middle: scene.focus, radius: scene.radius, secondMoment: scene.secondMoment},
-      [splats.place, splats.turn, splats.size, splats.tint, ...splats.light].map(a => a.buffer));
+    worker.postMessage({merge: splats, columns: scene.columns, exact: scene.exact, levels: levelsBelow, middle: scene.focus, radius: scene.radius, secondMoment: scene.secondMoment},
+      splats.layers.map(a => a.buffer));
   }
 
   get focus() { return add(this.camera.eye, this.camera.axes[2], this.distance); }
@@ -96,11 +96,12 @@ class Viewer {
   frame(now) {
     this.requested = 0;
     if (this.held) return;
-    const moving = this.flight || keysDown.size || now - this.moved < 250;
+    const moving = this.flight || keysDown.size || now - this.moved < 250 || this.walker?.moving;
     const since = now - this.last;  // not a number after a rest
     this.last = moving ? now : NaN;
     if (this.flight && !this.flight(now)) this.flight = null;
-    if (keysDown.size) flyByKeys(this, Math.min(since || 16, 100) / 1000);
+    if (this.walker) this.walker.advance(Math.min(since || 16, 250) / 1000);
+    else if (keysDown.size) flyByKeys(this, Math.min(since || 16, 100) / 1000);
     // Fewer pixels while it moves and frames are slow; all of them at rest.
     if (moving && since) this.adapt(since);
     const ratio = Math.min(devicePixelRatio || 1, 2);
@@ -117,6 +118,7 @@ class Viewer {
       ++this.frames;
       if (!this.shown) this.showFirst(begun);
     }
+    this.notes?.place(inWindow(this.camera, this.canvas.clientWidth, this.canvas.clientHeight));
     if (moving) this.request();
   }
 

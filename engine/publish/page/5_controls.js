@@ -49,9 +49,10 @@ function listenToPointers(viewer) {
     held.y = event.clientY;
     if (down.size > 1) {
       const after = spread();
+      if (viewer.walker) return;
       pan(viewer, after.x - before.x, after.y - before.y);
       approach(viewer, before.size / after.size);
-    } else if (event.buttons & 6 || event.shiftKey) {
+    } else if (!viewer.walker && (event.buttons & 6 || event.shiftKey)) {
       pan(viewer, dx, dy);
     } else {
       look(viewer, dx, dy);
@@ -64,7 +65,7 @@ function listenToPointers(viewer) {
   canvas.addEventListener("wheel", event => {
     event.preventDefault();
     viewer.flight = null;
-    approach(viewer, Math.exp(Math.max(-100, Math.min(100, event.deltaY * (event.deltaMode ? 30 : 1))) / 500));
+    if (!viewer.walker) approach(viewer, Math.exp(Math.max(-100, Math.min(100, event.deltaY * (event.deltaMode ? 30 : 1))) / 500));
     viewer.changed();
   }, {passive: false});
 }
@@ -77,7 +78,8 @@ function listenToKeys(viewer, actions) {
       if (event.target.tagName === "BUTTON" && event.code.startsWith("Arrow")) return;
       viewer.flight = null;
       keysDown.add(event.code);
-      if (keyAxis[event.code] && !event.repeat) flyByKeys(viewer, 1 / 60);
+      if (keyAxis[event.code] && !event.repeat && !viewer.walker) flyByKeys(viewer, 1 / 60);
+      viewer.changed();
       if (keyAxis[event.code]) event.preventDefault();
     } else if (action && !event.repeat) {
       event.preventDefault();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The panel, loading, and the hook for tests.
 const opened = performance.now();
-let viewer, place = scene.start, loadedAfter;
+let viewer, around, place = scene.start, loadedAfter;
 
 function say(text) {
   element("note").textContent = text;
@@ -10,24 +10,33 @@ function say(text) {
 
 function fail(error) {
   element("loading").hidden = true;
-  say("Cannot show this scene: " + error.message + ".");
+  say("Cannot show this scene: " + error.message + "." + (around ? " Below is a picture of it, in which you can look around." : ""));
+  if (around) element("panel").hidden = true;
 }
 
 function firstPicture() {
   loadedAfter = performance.now() - opened;
   element("poster").classList.add("gone");
+  around?.leave(viewer);
   element("loading").hidden = !viewer.stream?.missing;
 }
 
 function goTo(index) {
+  if (viewer.walker) switchMode();
   place = (index + scene.cameras.length) % scene.cameras.length;
   element("camera").textContent = scene.cameras[place].name;
   viewer.jumpTo(scene.cameras[place], true);
 }
 
+// Orbit, fly, and walk where the page has ground.
 function switchMode() {
-  viewer.flying = !viewer.flying;
-  element("mode").textContent = viewer.flying ? "Fly" : "Orbit";
+  const walker = viewer.walker ? null : viewer.flying && scene.collider && (viewer.kept ??= new Walker(viewer));
+  viewer.flying = !viewer.flying || !!walker;
+  viewer.walker = walker && walker.begin() ? walker : null;
+  if (walker && !viewer.walker) viewer.flying = false;
+  if (viewer.kept) viewer.kept.element.hidden = !viewer.walker || !matchMedia("(any-pointer: coarse)").matches;
+  element("mode").textContent = viewer.walker ? "Walk" : viewer.flying ? "Fly" : "Orbit";
+  viewer.changed();
 }
 
 function switchFullScreen() {
@@ -46,6 +55,8 @@ function wirePanel() {
   };
   for (const [id, key] of [["previous", "ArrowLeft"], ["next", "ArrowRight"], ["camera", "0"], ["mode", "o"], ["full", "f"], ["ask", "?"]])
     element(id).onclick = actions[key];
+  if (scene.notes) actions.n = () => viewer.notes.step(1);
+  if (scene.collider) element("mode").title = "Orbit, fly or walk (O)";
   listenToPointers(viewer);
   listenToKeys(viewer, actions);
   element("facts").textContent = scene.facts;
@@ -61,6 +72,7 @@ function cameraOfAddress() {
 
 async function start() {
   cameraOfAddress();
+  if (scene.around) around = new Around();
   const canvas = element("view");
   canvas.addEventListener("webglcontextlost", () => say("The browser took the graphics memory back. Load the page again to go on."));
   const renderer = new Renderer(canvas);
@@ -68,7 +80,13 @@ async function start() {
   viewer = new Viewer(canvas, renderer);
   if (place !== Number(scene.poster)) element("poster").hidden = true;
   wirePanel();
-  addEventListener("hashchange", () => { cameraOfAddress(); goTo(place); });
+  if (scene.notes) viewer.notes = new Notes(viewer);
+  viewer.notes?.ofAddress();
+  addEventListener("hashchange", () => {
+    if (/^#note=/.test(location.hash)) return viewer.notes?.ofAddress();
+    cameraOfAddress();
+    goTo(place);
+  });
   await openSplats(viewer);
 }
 
@@ -82,6 +100,15 @@ window.darb = {
   // level: of splats, 0 has all; fine: at rest
   picture: async (camera, fine, level) => { await ready; viewer.fine = fine; return viewer.picture(cameraOf(camera), level); },
   get state() { return {shown: !!viewer?.shown, loadedAfter, camera: viewer?.camera, distance: viewer?.distance, format: viewer?.format, place, step: viewer?.step, levels: viewer?.renderer.levels.length, ...viewer?.stream?.state}; },
+  // From the ground below a point of the scene, legs of [u, v, seconds]: the level directions of Ground.
+  walk: (from, legs) => {
+    const walker = new Walker(viewer);
+    viewer.camera.eye = from;
+    const begun = walker.begin() && {feet: [...walker.feet]}, found = begun && [begun, ...walker.path(legs)];
+    walker.element.remove();
+    return found;
+  },
+  around: () => around,
   // Frames a second of a turn about the focus, and the step of `paces` it ends at.
   turn: async seconds => {
     await ready;

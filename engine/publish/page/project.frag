@@ -1,6 +1,6 @@
 // The page's twin of shaders/forward/project.comp: a texel a splat, by the same functions. Writes the mean and the
 // Cholesky factor, reach, colour and opacity; zeros for a splat that is not drawn. Where a splat's values stand,
-// "stored.glsl" says, which is arrays.glsl in a page that holds its splats and sog.glsl in one that fetches them.
+// "stored.glsl" says: words.glsl in a page that holds its splats, sog.glsl in one that fetches them.
 #include "shared/render_args.h"
 #include "shared/attribute_list.h"
 
@@ -20,14 +20,16 @@ uniform float low_pass;  // px^2
 
 layout(location = 0) out uvec4 splat_shape;  // mean, l11, l21
 layout(location = 1) out uvec4 splat_light;  // l22, opacity; rgb and sqrt(reach) as halves
+#if PAGE_SHAPED
+layout(location = 2) out uint splat_exponent;
+#endif
 
 vec3 splat_colour(ivec2 at, vec3 direction) {
     vec3 colour = 0.5 + SH_C0 * stored_dc(at);
     if (SH_DEGREE > 0) {
         float basis[SH_REST_MAX];
         sh_basis(direction, basis);
-        for (int k = 0; k < (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1; ++k)
-            colour += basis[k] * stored_rest(at, k);
+        colour += stored_rest(at, basis);
     }
     return max(colour, 0.0);
 }
@@ -35,6 +37,9 @@ vec3 splat_colour(ivec2 at, vec3 direction) {
 void main() {
     splat_shape = uvec4(0u);
     splat_light = uvec4(0u);
+#if PAGE_SHAPED
+    splat_exponent = 0u;
+#endif
     ivec2 at;
     if (!stored_at(at)) return;
     const vec4 position = stored_place(at);
@@ -42,12 +47,17 @@ void main() {
     const vec3 p = to_camera(camera, to_splat);
     if (!magnitude_below(p, 1e30) || !(p.z > camera.near_plane)) return;
 
-    float opacity = position.w;
-    float reach = kernel_reach(opacity, 0.0);
+    float opacity = position.w, exponent = 0.0;
+#if PAGE_SHAPED
+    float by_shape;
+    exponent = shape_exponent(stored_shape(at), by_shape);
+    splat_exponent = floatBitsToUint(exponent);
+#endif
+    float reach = kernel_reach(opacity, exponent);
     if (!(reach > 0.0)) return;
 
     const vec3 s = exp(clamp(stored_size(at), -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)) *
-        sqrt(kernel_covariance_scale(0.0));
+        sqrt(kernel_covariance_scale(exponent));
     vec3 j0, j1;
     jacobian_rows(camera, p, j0, j1);
     const mat3 axes = rotation_matrix(stored_turn(at));
@@ -58,7 +68,7 @@ void main() {
     if (!is_finite(f.determinant) || !(f.determinant > DETERMINANT_MIN * unit_area * unit_area)) return;
     if (FILTERED) {
         opacity *= compensation(r1, r2, f);
-        reach = kernel_reach(opacity, 0.0);
+        reach = kernel_reach(opacity, exponent);
         if (!(reach > 0.0)) return;
     }
 

@@ -53,9 +53,11 @@ vec4 stored_turn(ivec2 at) {
 vec3 stored_dc(ivec2 at) {
     return entries_of(texelFetch(sh0, at, 0), 1);
 }
-vec3 stored_rest(ivec2 at, int k) {
-    if (k >= terms) return vec3(0.0);
+vec3 stored_rest(ivec2 at, float basis[SH_REST_MAX]) {
+    vec3 sum = vec3(0.0);
     ivec2 bytes = ivec2(bytes_of(texelFetch(labels, at, 0)).rg);
     int label = bytes.r + 256 * bytes.g;
-    return entries_of(texelFetch(palette, ivec2(label % 64 * terms + k, label / 64), 0), 2);
+    for (int k = 0; k < min(terms, SH_REST_MAX); ++k)
+        sum += basis[k] * entries_of(texelFetch(palette, ivec2(label % 64 * terms + k, label / 64), 0), 2);
+    return sum;
 }

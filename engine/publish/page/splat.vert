@@ -4,6 +4,10 @@
 uniform highp usampler2D order;  // of splats, front to back
 uniform highp usampler2D shapes;
 uniform highp usampler2D lights;
+#if PAGE_SHAPED
+uniform highp usampler2D exponents;
+flat out float exponent;
+#endif
 uniform int batch;
 uniform int count;   // of the order
 uniform vec2 frame;  // px
@@ -28,6 +32,9 @@ void main() {
     l22 = uintBitsToFloat(packed_light.x);
     vec2 rest = unpackHalf2x16(packed_light.w);
     light = vec4(unpackHalf2x16(packed_light.z), rest.x, uintBitsToFloat(packed_light.y));
+#if PAGE_SHAPED
+    exponent = uintBitsToFloat(texelFetch(exponents, at, 0).x);
+#endif
     vec2 corner = (vec2(ivec2(gl_VertexID & 1, gl_VertexID >> 1 & 1)) * 2.0 - 1.0) * rest.y;
     float y = corner.y / l22;
     vec2 pixel = shape.xy + vec2((corner.x - shape.w * y) / shape.z, y);

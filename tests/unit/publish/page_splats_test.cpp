@@ -64,6 +64,40 @@ TEST(PageSplats, outlines_of_kernels_that_end_with_a_jump_are_finer) {
     EXPECT_EQ(jumps.position, smooth.position);
 }
 
+TEST(PageSplats, shapes_are_kept) {
+    SplatModel model = test::sample_model(1, 40);
+    set_kernel(model, KERNEL_BETA);
+    for (std::size_t i = 0; i < model.size(); ++i) model.shape[i] = 0.05f * static_cast<float>(i);
+    for (const int level : {0, kPageLevels}) {
+        const SplatModel back =
+            unpack_page_splats(pack_page_splats(model, page_precision(level, model.kernel)), model);
+        ASSERT_EQ(back.shape.size(), back.size());
+        std::vector<float> sorted = back.shape;
+        std::ranges::sort(sorted);
+        for (const float shape : sorted) {
+            const float nearest = 0.05f * std::round(shape / 0.05f);
+            EXPECT_NEAR(shape, nearest, level == 0 ? 0.5 / 128 + 1e-6 : 1e-6);
+        }
+    }
+}
+
+TEST(PageSplats, columns_fill_words_and_do_not_overlap) {
+    for (const int level : {0, kPageLevels}) {
+        const PageSplats packed =
+            pack_page_splats(test::sample_model(3, 100), page_precision(level, KERNEL_GAUSSIAN));
+        std::vector<std::uint32_t> taken(static_cast<std::size_t>(packed.words));
+        for (const PageColumn& c : packed.columns) {
+            const bool whole = c.attribute == kPosition || c.bits == 32;
+            const std::uint32_t mask = whole ? ~0u : ((1u << c.bits) - 1) << c.shift;
+            ASSERT_LT(c.word, packed.words);
+            ASSERT_LE(c.shift + (whole ? 32 : c.bits), 32);
+            EXPECT_EQ(taken[static_cast<std::size_t>(c.word)] & mask, 0u);
+            taken[static_cast<std::size_t>(c.word)] |= mask;
+        }
+        EXPECT_LE(packed.words, level == 0 ? 20 : 37) << "a splat takes more memory than before";
+    }
+}
+
 TEST(PageSplats, what_is_never_drawn_is_left_out) {
     SplatModel model = test::sample_model(0, 10);
     for (float& logit : model.opacity_logit) logit = 1;
