@@ -10,6 +10,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/core/error.h"
@@ -57,9 +58,10 @@ nlohmann::json told_light(std::FILE* out, const LightReport& light);
 namespace {
 
 struct EvalFlags {
-    std::filesystem::path scene, dataset, json;
+    std::filesystem::path scene, dataset, json, paper;
     std::string split = "test", device, effects = "auto";
     bool eval_exposure = false, quiet = false, light = false, align = false, white = false;
+    bool flip = false;
     std::vector<double> scales;  // empty: the size of the photos
     StoredUnits units;
     DatasetOptions data;
@@ -81,7 +83,9 @@ std::vector<View> views_of(const Dataset& dataset, const EvalFlags& flags) {
 int eval(Ranks& ranks, EvalFlags flags) {
     refuse_to_overwrite_inputs({flags.json},
                                together({files_of(flags.scene), files_of(flags.dataset)}));
+    check_paper_folder(flags.paper);
     SceneEvaluation options;
+    options.flip = flags.flip;
     options.ranks = &ranks;
     options.accuracy = chosen_accuracy(flags.accuracy);
     hold_out_as_trained(flags.scene, flags.data);
@@ -111,14 +115,18 @@ int eval(Ranks& ranks, EvalFlags flags) {
     settle_tuning(device);
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
     nlohmann::json figures;
+    Report report("Evaluation", name_in_json(flags.paper, flags.scene) + " on " +
+                                    name_in_json(flags.paper, flags.dataset));
     if (flags.scales.empty()) {
         const Evaluation measured = evaluate_scene(device, model, views, options);
         figures = evaluation_json(measured);
         print_evaluation(out, measured);
+        report.table(evaluation_table(measured));
     } else {
         const auto scales = evaluate_scales(device, model, flags.scales, sizes, options);
         figures = evaluation_json(scales);
         print_evaluation(out, scales);
+        report.table(evaluation_table(scales));
     }
     if (!away.views.empty()) {
         options.alpha_is_mask = away.alpha_is_mask;
@@ -127,13 +135,19 @@ int eval(Ranks& ranks, EvalFlags flags) {
         tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
              evaluation.psnr_db, evaluation.ssim);
         print_depth(out, evaluation);
+        Table table = evaluation_table(evaluation);
+        table.name = "off path";
+        table.title = "Views off the path";
+        report.table(std::move(table));
     }
     if (!ranks.is_first()) return 0;
     if (flags.light)
         figures["light_of_few_views"] = told_light(
             out, measure_light(device, model, options.effects, dataset.views, views, beyond));
     write_json(flags.json, figures);
-    tell_paths(flags.quiet, {flags.json});
+    write_paper(flags.paper, report,
+                together({files_of(flags.scene), files_of(dataset.views), files_of(away.views)}));
+    tell_paths(flags.quiet, {flags.json, flags.paper});
     return 0;
 }
 
@@ -184,6 +198,9 @@ void add_eval(CLI::App& app, Action& action) {
         ->capture_default_str()
         ->check(CLI::IsMember({"test", "train", "all"}));
     add_json_option(*command, flags->json);
+    add_paper_option(*command, flags->paper);
+    command->add_flag("--flip", flags->flip,
+                      "also measure FLIP, what a viewer sees change between picture and photo");
     command
         ->add_option("-i,--images", flags->data.images_folder, "photo folder of a COLMAP project")
         ->capture_default_str();
