@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <iterator>
 
 #include "engine/report/drawing.h"
 #include "engine/report/html.h"
@@ -233,86 +235,56 @@ std::string csv_table(const Table& whole) {
 
 // LaTeX.
 
+namespace {
+
+// What stands for a character that LaTeX would take for markup, or that a font may lack.
+constexpr std::pair<char32_t, std::string_view> kLatex[] = {
+    {'\\', "\\textbackslash{}"},
+    {'~', "\\textasciitilde{}"},
+    {'^', "\\textasciicircum{}"},
+    {'<', "\\textless{}"},
+    {'>', "\\textgreater{}"},
+    {'|', "\\textbar{}"},
+    {'`', "\\textasciigrave{}"},
+    {'"', "''"},
+    {'-', "{-}"},  // two of them would become a dash
+    {'[', "{[}"},  // after \\ it would begin an option
+    {'*', "{*}"},  // as would this
+    {'{', "\\{"},
+    {'}', "\\}"},
+    {'$', "\\$"},
+    {'&', "\\&"},
+    {'#', "\\#"},
+    {'%', "\\%"},
+    {'_', "\\_"},
+    {0xB0, "$^\\circ$"},
+    {0xB1, "$\\pm$"},
+    {0xB2, "$^2$"},
+    {0xB3, "$^3$"},
+    {0xB5, "$\\mu$"},
+    {0xB7, "$\\cdot$"},
+    {0xD7, "$\\times$"}};
+
+// Letters of Latin-1 and Latin Extended-A that every LaTeX of today sets.
+bool is_latin_letter(char32_t point) {
+    return point >= 0xC0 && point <= 0x17E && point != 0xF7 && point != 0x13F && point != 0x140 &&
+           point != 0x149;
+}
+
+}  // namespace
+
 std::string latex_escape(std::string_view text) {
     std::string out;
     for (const char32_t point : code_points(text)) {
-        if (point < 0x20 || point == 0x7F || (point >= 0x80 && point < 0xA1)) {
+        const auto known = std::find_if(std::begin(kLatex), std::end(kLatex),
+                                        [&](const auto& pair) { return pair.first == point; });
+        if (known != std::end(kLatex))
+            out += known->second;
+        else if (point < 0x20 || (point >= 0x7F && point <= 0xA0))
             out += ' ';
-            continue;
-        }
-        switch (point) {
-            case '\\':
-                out += "\\textbackslash{}";
-                continue;
-            case '~':
-                out += "\\textasciitilde{}";
-                continue;
-            case '^':
-                out += "\\textasciicircum{}";
-                continue;
-            case '<':
-                out += "\\textless{}";
-                continue;
-            case '>':
-                out += "\\textgreater{}";
-                continue;
-            case '|':
-                out += "\\textbar{}";
-                continue;
-            case '"':
-                out += "''";
-                continue;
-            case '`':
-                out += "\\textasciigrave{}";
-                continue;
-            case '-':
-                out += "{-}";
-                continue;  // two of them would become a dash
-            case '[':
-                out += "{[}";
-                continue;  // after \\ it would begin an option
-            case '*':
-                out += "{*}";
-                continue;  // as would this
-            case '{':
-            case '}':
-            case '$':
-            case '&':
-            case '#':
-            case '%':
-            case '_':
-                out += '\\';
-                out += static_cast<char>(point);
-                continue;
-            case 0xB1:
-                out += "$\\pm$";
-                continue;
-            case 0xB2:
-                out += "$^2$";
-                continue;
-            case 0xB3:
-                out += "$^3$";
-                continue;
-            case 0xB5:
-                out += "$\\mu$";
-                continue;
-            case 0xB7:
-                out += "$\\cdot$";
-                continue;
-            case 0xB0:
-                out += "$^\\circ$";
-                continue;
-            case 0xD7:
-                out += "$\\times$";
-                continue;
-            default:
-                break;
-        }
-        const bool letter = point >= 0xC0 && point <= 0x17E && point != 0xF7 && point != 0x13F &&
-                            point != 0x140 && point != 0x149 && point != 0x17F;
-        if (point < 0x80)
+        else if (point < 0x80)
             out += static_cast<char>(point);
-        else if (letter)
+        else if (is_latin_letter(point))
             out += {static_cast<char>(0xC0 | point >> 6), static_cast<char>(0x80 | (point & 0x3F))};
         else
             out += fmt::format("{{[}}U+{:04X}]", static_cast<std::uint32_t>(point));

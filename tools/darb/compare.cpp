@@ -128,19 +128,8 @@ nlohmann::json shared_json(Comparison comparison, const std::filesystem::path& f
     return comparison_json(comparison);
 }
 
-int compare(Ranks& ranks, CompareFlags flags) {
-    check_flags(flags);
-    const std::vector<int> kernels = kernels_of(flags);
-    Comparison comparison;
-    const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
-    // wrong options end it before anything begins
-    for (const std::string& dataset : flags.datasets) {
-        const TrainRequest run = train_request_of(flags, dataset, kernels.front(), 0);
-        refuse_without_cameras(run, ranks.count());
-        if (effect_in_words(run.effects, "cameras").value_or(false))
-            throw Error("--effects with cameras", "has no place in compare, which has one for all",
-                        "Leave cameras out: darb eval measures runs that refine theirs.");
-    }
+/// What all its data sets share.
+void take_head(const CompareFlags& flags, const std::vector<int>& kernels, Comparison& comparison) {
     for (const int kernel : kernels) comparison.kernels.emplace_back(kernel_name(kernel));
     for (const AddedMethod& method : added_methods(flags))
         if (std::find(comparison.added.begin(), comparison.added.end(), method.name) ==
@@ -158,6 +147,22 @@ int compare(Ranks& ranks, CompareFlags flags) {
         comparison.machines = {{device.info().name, device.info().driver}};
         comparison.device = device.info().name + ", " + device.info().driver;
     }
+}
+
+int compare(Ranks& ranks, CompareFlags flags) {
+    check_flags(flags);
+    const std::vector<int> kernels = kernels_of(flags);
+    Comparison comparison;
+    const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
+    // wrong options end it before anything begins
+    for (const std::string& dataset : flags.datasets) {
+        const TrainRequest run = train_request_of(flags, dataset, kernels.front(), 0);
+        refuse_without_cameras(run, ranks.count());
+        if (effect_in_words(run.effects, "cameras").value_or(false))
+            throw Error("--effects with cameras", "has no place in compare, which has one for all",
+                        "Leave cameras out: darb eval measures runs that refine theirs.");
+    }
+    take_head(flags, kernels, comparison);
     std::optional<RunLock> lock;
     if (ranks.is_first()) lock.emplace(flags.output);
     const std::atomic<bool>& stop = stop_on_signals();
@@ -439,6 +444,31 @@ void forward(CLI::App& command, CompareFlags& flags, const std::string& names,
         help);
 }
 
+/// What is measured beside PSNR and SSIM, and on what beside the runs.
+void add_measure_flags(CLI::App& command, CLI::Option* datasets, CompareFlags& flags) {
+    command
+        .add_option("--lpips", flags.lpips,
+                    "a safetensors file with the weights of AlexNet or VGG16 or of LPIPS's layers; "
+                    "once for each file")
+        ->allow_extra_args(false);
+    command.add_flag("--flip", flags.flip,
+                     "also measure FLIP, what a viewer sees change between picture and photo");
+    auto* add = command
+                    .add_option("--add", flags.add,
+                                "NAME=FILE: also measure the splats of another program, in any "
+                                "format that darb reads; NAME@DATASET=FILE where there are several "
+                                "data sets; once for each")
+                    ->allow_extra_args(false);
+    command
+        .add_option("--merge", flags.merge,
+                    "instead of comparing, make one report of several compare.json, such as those "
+                    "of several machines")
+        ->excludes(datasets)
+        ->excludes(add);
+    command.add_flag("--lpips-as-3dgs", flags.lpips_as_3dgs,
+                     "feed colours from 0 to 1 into LPIPS, as published figures of splats do");
+}
+
 }  // namespace
 
 void add_compare_flags(CLI::App& command, CompareFlags& flags) {
@@ -483,27 +513,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     forward(command, flags, "--strategy", "--strategy", strategy_names());
     command.add_option("--train-options", flags.train_options,
                        "more options of darb train, together in quotes");
-    command
-        .add_option("--lpips", flags.lpips,
-                    "a safetensors file with the weights of AlexNet or VGG16 or of LPIPS's layers; "
-                    "once for each file")
-        ->allow_extra_args(false);
-    command.add_flag("--flip", flags.flip,
-                     "also measure FLIP, what a viewer sees change between picture and photo");
-    auto* add = command
-                    .add_option("--add", flags.add,
-                                "NAME=FILE: also measure the splats of another program, in any "
-                                "format that darb reads; NAME@DATASET=FILE where there are several "
-                                "data sets; once for each")
-                    ->allow_extra_args(false);
-    command
-        .add_option("--merge", flags.merge,
-                    "instead of comparing, make one report of several compare.json, such as those "
-                    "of several machines")
-        ->excludes(datasets)
-        ->excludes(add);
-    command.add_flag("--lpips-as-3dgs", flags.lpips_as_3dgs,
-                     "feed colours from 0 to 1 into LPIPS, as published figures of splats do");
+    add_measure_flags(command, datasets, flags);
     command
         .add_option("--blending-views", flags.blending_views,
                     "views whose blending is counted and timed; 0: none")

@@ -80,6 +80,24 @@ std::vector<View> views_of(const Dataset& dataset, const EvalFlags& flags) {
     return views;
 }
 
+void tell_off_path(std::FILE* out, const Evaluation& evaluation, Report& report) {
+    tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
+         evaluation.psnr_db, evaluation.ssim);
+    print_depth(out, evaluation);
+    Table table = evaluation_table(evaluation);
+    table.name = "off path";
+    table.title = "Views off the path";
+    report.table(std::move(table));
+}
+
+/// Tells the evaluation, one or at several sizes, and returns it as JSON.
+template <class Measured>
+nlohmann::json told_evaluation(std::FILE* out, const Measured& measured, Report& report) {
+    print_evaluation(out, measured);
+    report.table(evaluation_table(measured));
+    return evaluation_json(measured);
+}
+
 int eval(Ranks& ranks, EvalFlags flags) {
     refuse_to_overwrite_inputs({flags.json},
                                together({files_of(flags.scene), files_of(flags.dataset)}));
@@ -114,31 +132,18 @@ int eval(Ranks& ranks, EvalFlags flags) {
     Device device(device_options);
     settle_tuning(device);
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
-    nlohmann::json figures;
     Report report("Evaluation", name_in_json(flags.paper, flags.scene) + " on " +
                                     name_in_json(flags.paper, flags.dataset));
-    if (flags.scales.empty()) {
-        const Evaluation measured = evaluate_scene(device, model, views, options);
-        figures = evaluation_json(measured);
-        print_evaluation(out, measured);
-        report.table(evaluation_table(measured));
-    } else {
-        const auto scales = evaluate_scales(device, model, flags.scales, sizes, options);
-        figures = evaluation_json(scales);
-        print_evaluation(out, scales);
-        report.table(evaluation_table(scales));
-    }
+    nlohmann::json figures =
+        flags.scales.empty()
+            ? told_evaluation(out, evaluate_scene(device, model, views, options), report)
+            : told_evaluation(out, evaluate_scales(device, model, flags.scales, sizes, options),
+                              report);
     if (!away.views.empty()) {
         options.alpha_is_mask = away.alpha_is_mask;
         const Evaluation evaluation = evaluate_scene(device, model, beyond, options);
         figures["off_path"] = evaluation_json(evaluation);
-        tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
-             evaluation.psnr_db, evaluation.ssim);
-        print_depth(out, evaluation);
-        Table table = evaluation_table(evaluation);
-        table.name = "off path";
-        table.title = "Views off the path";
-        report.table(std::move(table));
+        tell_off_path(out, evaluation, report);
     }
     if (!ranks.is_first()) return 0;
     if (flags.light)
