@@ -13,6 +13,7 @@
 #include "engine/core/error.h"
 #include "engine/core/on_threads.h"
 #include "engine/core/quantile.h"
+#include "engine/data/flip.h"
 
 namespace darb {
 
@@ -200,27 +201,56 @@ ImageU8 side_by_side(const ImageF& photo, const ImageF& render) {
     return to_8bit(all);
 }
 
-ViewMetrics compare_view(const std::string& name, const ImageF& render, const ImageU8& photo,
-                         const glm::vec3& background, bool alpha_is_mask) {
-    ImageF truth = composite(photo, background);
-    const auto finite_psnr = [&](const ImageF& image, double more) {
-        return std::min(psnr(image, truth) + more, kEqual_db);
-    };
-    if (!alpha_is_mask) return {name, finite_psnr(render, 0), ssim(render, truth)};
-    ImageF shown = render;
+namespace {
+
+// Render and photo over the same background; where alpha is a mask, both black where it masks.
+struct ComparedPair {
+    ImageF shown, truth;
+    std::vector<bool> counts;  // empty: every pixel does
+    double share = 1;          // of the pixels that count
+};
+
+ComparedPair compared_pair(const ImageF& render, const ImageU8& photo, const glm::vec3& background,
+                           bool alpha_is_mask) {
+    ComparedPair pair{render, composite(photo, background), {}};
+    if (!alpha_is_mask) return pair;
     const size_t pixels = size_t(photo.width) * photo.height;
     size_t counted = 0;
     for (size_t p = 0; p < pixels; ++p) {
         const bool counts = photo.data[p * 4 + 3] >= 128;
+        pair.counts.push_back(counts);
         counted += counts ? 1 : 0;
         for (size_t c = 0; c < 3; ++c) {
-            truth.data[p * 3 + c] = counts ? photo.data[p * 4 + c] / 255.0f : 0.0f;
-            if (!counts) shown.data[p * 3 + c] = 0.0f;
+            pair.truth.data[p * 3 + c] = counts ? photo.data[p * 4 + c] / 255.0f : 0.0f;
+            if (!counts) pair.shown.data[p * 3 + c] = 0.0f;
         }
     }
-    if (counted == 0) return {name, std::nan(""), std::nan("")};
-    const double share = static_cast<double>(counted) / static_cast<double>(pixels);
-    return {name, finite_psnr(shown, 10.0 * std::log10(share)), ssim(shown, truth)};
+    pair.share = static_cast<double>(counted) / static_cast<double>(pixels);
+    return pair;
+}
+
+}  // namespace
+
+ViewMetrics compare_view(const std::string& name, const ImageF& render, const ImageU8& photo,
+                         const glm::vec3& background, bool alpha_is_mask) {
+    const ComparedPair pair = compared_pair(render, photo, background, alpha_is_mask);
+    if (pair.share == 0) return {name, std::nan(""), std::nan("")};
+    const double all = psnr(pair.shown, pair.truth);
+    return {name, std::min(all + 10.0 * std::log10(pair.share), kEqual_db),
+            ssim(pair.shown, pair.truth)};
+}
+
+double flip_of_view(const ImageF& render, const ImageU8& photo, const glm::vec3& background,
+                    bool alpha_is_mask) {
+    const ComparedPair pair = compared_pair(render, photo, background, alpha_is_mask);
+    const ImageF map = flip_map(pair.shown, pair.truth);
+    double sum = 0, count = 0;
+    for (size_t p = 0; p < map.data.size(); ++p) {
+        if (!pair.counts.empty() && !pair.counts[p]) continue;
+        sum += map.data[p];
+        ++count;
+    }
+    return count > 0 ? sum / count : std::nan("");
 }
 
 std::optional<DepthError> compare_depth(const ImageF& rendered, const ImageF& measured,

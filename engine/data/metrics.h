@@ -36,6 +36,7 @@ struct ViewMetrics {
     double psnr_db = 0, ssim = 0;
     bool in_arc = false;                   // View::in_arc; the caller sets it
     std::optional<DepthError> depth = {};  // the caller sets it, too
+    std::optional<double> flip = {};       // and this: FLIP, where it was asked for
 };
 
 /// The photo as float RGB (value / 255), composited with straight alpha over a background.
@@ -51,6 +52,10 @@ ImageU8 side_by_side(const ImageF& photo, const ImageF& render);
 /// 100 dB at most.
 ViewMetrics compare_view(const std::string& name, const ImageF& render, const ImageU8& photo,
                          const glm::vec3& background, bool alpha_is_mask = false);
+
+/// FLIP of the same two pictures, the mean over the pixels that count; NaN where none does.
+double flip_of_view(const ImageF& render, const ImageU8& photo, const glm::vec3& background,
+                    bool alpha_is_mask = false);
 
 /// rendered: [H][W][2] depth and opacity in world units, as Renderer::render_depth gives them;
 /// measured: [H][W] from load_depth; scale: world units a metre. Returns nothing where no pixel

@@ -7,9 +7,8 @@
 #include <cmath>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
-
-#include "engine/report/html.h"
 
 namespace darb {
 
@@ -31,23 +30,19 @@ struct Axis {
 
 std::vector<double> ticks_of(const Axis& axis);
 /// Draws the grid, ticks, both axes and their labels.
-std::string draw_axes(const std::string& x_label, const std::string& y_label, const Axis& x,
-                      const Axis& y);
-/// The opening tag and the title. kind: a CSS class of the element.
-std::string open_plot(const std::string& title, double height = kPlotHeight,
-                      double width = kPlotWidth, const std::string& kind = {});
+void draw_axes(const std::string& x_label, const std::string& y_label, const Axis& x, const Axis& y,
+               Drawing& drawing);
+/// An empty drawing with the title. kind: a CSS class of the element.
+Drawing open_plot(const std::string& title, double height = kPlotHeight, double width = kPlotWidth,
+                  const std::string& kind = {});
 
 struct LegendEntry {
     std::string name;
     enum class Swatch { line, dot, area } swatch = Swatch::line;
 };
 /// Draws names, each with a colour swatch, below the title, in as many lines as they need; nothing
-/// for a single name.
-struct Legend {
-    std::string svg;
-    double height = 0;  // by which the plot moves down
-};
-Legend draw_legend(const std::vector<LegendEntry>& entries, double width = kPlotWidth);
+/// for a single name. Returns by how much the plot moves down, user units.
+double draw_legend(const std::vector<LegendEntry>& entries, Drawing& drawing);
 /// The width of a text in the font of ticks and legends, user units.
 double text_width(const std::string& text);
 /// The text, or where it is wider than that, its beginning and an ellipsis.
@@ -57,19 +52,35 @@ namespace {
 
 constexpr std::size_t kMaxPoints = 600;  // per curve; more cannot be distinguished at this size
 
-std::string draw_dot(const PlotSeries& series, std::size_t index, std::size_t point, const Axis& x,
-                     const Axis& y) {
+void draw_dot(const PlotSeries& series, std::size_t index, std::size_t point, const Axis& x,
+              const Axis& y, Drawing& drawing) {
     const auto& [px, py] = series.points[point];
     const std::string title = point < series.titles.size()
                                   ? series.titles[point]
                                   : fmt::format("{}: {:.6g}, {:.6g}", series.name, px, py);
-    return fmt::format(
-        "<circle class='s{}' cx='{:.1f}' cy='{:.1f}' r='3.5'><title>{}</title></circle>", index,
-        x.place(px), y.place(py), html_escape(title));
+    drawing.add_circle(x.place(px), y.place(py), 3.5, static_cast<int>(index), title);
 }
 
-std::string draw_series(const PlotSeries& series, std::size_t index, const Axis& x, const Axis& y) {
-    std::string path, dots;
+void draw_band(const PlotSeries& series, std::size_t index, const Axis& x, const Axis& y,
+               Drawing& drawing) {
+    std::vector<PathStep> there, back;
+    for (std::size_t i = 0; i < std::min(series.band.size(), series.points.size()); ++i) {
+        const double px = series.points[i].first;
+        const auto& [low, high] = series.band[i];
+        if (!x.takes(px) || !y.takes(low) || !y.takes(high)) continue;
+        there.push_back({there.empty() ? 'M' : 'L', x.place(px), y.place(high)});
+        back.push_back({'L', x.place(px), y.place(low)});
+    }
+    if (there.size() < 2) return;
+    there.insert(there.end(), back.rbegin(), back.rend());
+    there.push_back({'z'});
+    drawing.add_path("band", std::move(there), static_cast<int>(index));
+}
+
+void draw_series(const PlotSeries& series, std::size_t index, const Axis& x, const Axis& y,
+                 Drawing& drawing) {
+    std::vector<PathStep> path;
+    std::vector<std::size_t> dots;
     const std::size_t stride =
         series.line ? (series.points.size() + kMaxPoints - 1) / kMaxPoints : 1;
     bool pen_down = false;
@@ -81,13 +92,32 @@ std::string draw_series(const PlotSeries& series, std::size_t index, const Axis&
             pen_down = false;
             continue;
         }
-        if (series.stairs && pen_down) path += fmt::format("H{:.1f}", x.place(px));
-        path += fmt::format("{}{:.1f} {:.1f}", pen_down ? 'L' : 'M', x.place(px), y.place(py));
+        if (series.stairs && pen_down) path.push_back({'L', x.place(px), path.back().y});
+        path.push_back({pen_down ? 'L' : 'M', x.place(px), y.place(py)});
         pen_down = true;
-        if (series.dots) dots += draw_dot(series, index, i, x, y);
+        if (series.dots) dots.push_back(i);
     }
-    if (!series.line || path.empty()) return dots;
-    return fmt::format("<path class='line s{}' d='{}'/>{}", index, path, dots);
+    if (series.line && !path.empty())
+        drawing.add_path("line", std::move(path), static_cast<int>(index));
+    for (const std::size_t i : dots) draw_dot(series, index, i, x, y, drawing);
+}
+
+/// The axes over all points and bands of the series that they take.
+std::pair<Axis, Axis> axes_over(const Plot& plot) {
+    Axis x, y;
+    x.log = plot.log_x;
+    y.log = plot.log_y;
+    for (const PlotSeries& series : plot.series)
+        for (std::size_t i = 0; i < series.points.size(); ++i) {
+            const auto& [px, py] = series.points[i];
+            if (!x.takes(px) || !y.takes(py)) continue;
+            x.include(px);
+            y.include(py);
+            if (i >= series.band.size()) continue;
+            for (const double end : {series.band[i].first, series.band[i].second})
+                if (y.takes(end)) y.include(end);
+        }
+    return {x, y};
 }
 
 }  // namespace
@@ -106,16 +136,8 @@ std::vector<double> round_ticks(double low, double high) {
     return ticks;
 }
 
-std::string svg_plot(const Plot& plot) {
-    Axis x, y;
-    x.log = plot.log_x;
-    y.log = plot.log_y;
-    for (const PlotSeries& series : plot.series)
-        for (const auto& [px, py] : series.points)
-            if (x.takes(px) && y.takes(py)) {
-                x.include(px);
-                y.include(py);
-            }
+Drawing draw_plot(const Plot& plot, DrawnFor place) {
+    auto [x, y] = axes_over(plot);
     if (x.empty()) return {};
     const bool from_zero = plot.x_from_zero && !plot.log_x;
     if (from_zero) x.include(0);
@@ -136,17 +158,51 @@ std::string svg_plot(const Plot& plot) {
     for (const PlotSeries& series : plot.series)
         entries.push_back(
             {series.name, series.line ? LegendEntry::Swatch::line : LegendEntry::Swatch::dot});
-    const Legend legend = draw_legend(entries);
-    y.to = kPlotTop + legend.height;
-    y.from = kPlotHeight + legend.height - kPlotBottom;
-    std::string svg = open_plot(plot.title, kPlotHeight + legend.height) + legend.svg +
-                      draw_axes(plot.x_label, plot.y_label, x, y);
+    if (plot.legend_beside && place == DrawnFor::page) entries.clear();
+    Drawing drawing = open_plot(plot.title);
+    const double down = draw_legend(entries, drawing);
+    drawing.height += down;
+    y.to = kPlotTop + down;
+    y.from = kPlotHeight + down - kPlotBottom;
+    draw_axes(plot.x_label, plot.y_label, x, y, drawing);
     for (std::size_t i = 0; i < plot.series.size(); ++i)
-        svg += draw_series(plot.series[i], i, x, y);
-    return svg + "</svg>\n";
+        draw_band(plot.series[i], i, x, y, drawing);
+    for (std::size_t i = 0; i < plot.series.size(); ++i)
+        draw_series(plot.series[i], i, x, y, drawing);
+    return drawing;
 }
 
-std::string svg_stack(const StackPlot& plot) {
+std::string svg_plot(const Plot& plot) {
+    return svg_inline(draw_plot(plot));
+}
+
+namespace {
+
+/// One layer on top of those before it, whose sum is in `base`, and which it is added to.
+void draw_layer(const StackPlot& plot, std::size_t l, const Axis& x, const Axis& y,
+                std::vector<double>& base, Drawing& drawing) {
+    const std::size_t stride = (plot.x.size() + kMaxPoints - 1) / kMaxPoints;
+    std::vector<PathStep> path, back;
+    double sum = 0;
+    for (std::size_t i = 0; i < plot.x.size(); i += stride) {
+        const double above = base[i] + plot.layers[l][i];
+        path.push_back({path.empty() ? 'M' : 'L', x.place(plot.x[i]), y.place(above)});
+        back.push_back({'L', x.place(plot.x[i]), y.place(base[i])});
+    }
+    for (std::size_t i = 0; i < plot.x.size(); ++i) {
+        base[i] += plot.layers[l][i];
+        sum += plot.layers[l][i];
+    }
+    path.insert(path.end(), back.rbegin(), back.rend());
+    path.push_back({'z'});
+    drawing.add_path("area", std::move(path), static_cast<int>(l),
+                     fmt::format("{}: {:.3g} in the mean", plot.names[l],
+                                 sum / static_cast<double>(plot.x.size())));
+}
+
+}  // namespace
+
+Drawing draw_plot(const StackPlot& plot, DrawnFor) {
     Axis x, y;
     std::vector<double> top(plot.x.size(), 0.0);
     for (const std::vector<double>& layer : plot.layers)
@@ -164,32 +220,19 @@ std::string svg_stack(const StackPlot& plot) {
     x.to = kPlotWidth - kPlotRight;
     std::vector<LegendEntry> entries;
     for (const std::string& name : plot.names) entries.push_back({name, LegendEntry::Swatch::area});
-    const Legend legend = draw_legend(entries);
-    y.to = kPlotTop + legend.height;
-    y.from = kPlotHeight + legend.height - kPlotBottom;
-    std::string svg = open_plot(plot.title, kPlotHeight + legend.height) + legend.svg +
-                      draw_axes(plot.x_label, plot.y_label, x, y);
+    Drawing drawing = open_plot(plot.title);
+    const double down = draw_legend(entries, drawing);
+    drawing.height += down;
+    y.to = kPlotTop + down;
+    y.from = kPlotHeight + down - kPlotBottom;
+    draw_axes(plot.x_label, plot.y_label, x, y, drawing);
     std::vector<double> base(plot.x.size(), 0.0);
-    const std::size_t stride = (plot.x.size() + kMaxPoints - 1) / kMaxPoints;
-    for (std::size_t l = 0; l < plot.layers.size(); ++l) {
-        std::string there, back;
-        double sum = 0;
-        for (std::size_t i = 0; i < plot.x.size(); i += stride) {
-            const double above = base[i] + plot.layers[l][i];
-            there += fmt::format("{}{:.1f} {:.1f}", there.empty() ? 'M' : 'L', x.place(plot.x[i]),
-                                 y.place(above));
-            back.insert(0, fmt::format("L{:.1f} {:.1f}", x.place(plot.x[i]), y.place(base[i])));
-        }
-        for (std::size_t i = 0; i < plot.x.size(); ++i) {
-            base[i] += plot.layers[l][i];
-            sum += plot.layers[l][i];
-        }
-        svg += fmt::format(
-            "<path class='area s{}' d='{}{}z'><title>{}: {:.3g} in the mean</title>"
-            "</path>",
-            l, there, back, html_escape(plot.names[l]), sum / static_cast<double>(plot.x.size()));
-    }
-    return svg + "</svg>\n";
+    for (std::size_t l = 0; l < plot.layers.size(); ++l) draw_layer(plot, l, x, y, base, drawing);
+    return drawing;
+}
+
+std::string svg_stack(const StackPlot& plot) {
+    return svg_inline(draw_plot(plot));
 }
 
 namespace {
@@ -264,40 +307,27 @@ std::vector<double> ticks_of(const Axis& axis) {
     return round_ticks(std::pow(10, axis.low), std::pow(10, axis.high));
 }
 
-std::string draw_axes(const std::string& x_label, const std::string& y_label, const Axis& x,
-                      const Axis& y) {
-    std::string svg;
+void draw_axes(const std::string& x_label, const std::string& y_label, const Axis& x, const Axis& y,
+               Drawing& drawing) {
     for (const double v : y.empty() ? std::vector<double>{} : apart(ticks_of(y), y, true)) {
-        svg +=
-            fmt::format("<path class='grid' d='M{:.1f} {:.1f}H{:.1f}'/>", x.from, y.place(v), x.to);
-        svg += fmt::format("<text class='tick' text-anchor='end' x='{:.1f}' y='{:.1f}'>{}</text>",
-                           x.from - 6, y.place(v) + 4, tick_text(v));
+        drawing.add_path("grid", {{'M', x.from, y.place(v)}, {'L', x.to, y.place(v)}});
+        drawing.add_text("tick", x.from - 6, y.place(v) + 4, tick_text(v), Anchor::end);
     }
     for (const double v : apart(ticks_of(x), x, false)) {
-        svg +=
-            fmt::format("<path class='grid' d='M{:.1f} {:.1f}V{:.1f}'/>", x.place(v), y.from, y.to);
-        svg +=
-            fmt::format("<text class='tick' text-anchor='middle' x='{:.1f}' y='{:.1f}'>{}</text>",
-                        x.place(v), y.from + 16, tick_text(v));
+        drawing.add_path("grid", {{'M', x.place(v), y.from}, {'L', x.place(v), y.to}});
+        drawing.add_text("tick", x.place(v), y.from + 16, tick_text(v), Anchor::middle);
     }
-    svg += fmt::format("<path class='axis' d='M{:.1f} {:.1f}V{:.1f}H{:.1f}'/>", x.from, y.to,
-                       y.from, x.to);
-    svg += fmt::format("<text class='label' text-anchor='middle' x='{:.1f}' y='{:.1f}'>{}</text>",
-                       (x.from + x.to) / 2, y.from + 36, html_escape(x_label));
-    if (y_label.empty()) return svg;
-    return svg + fmt::format(
-                     "<text class='label' text-anchor='middle' transform='translate(13 {:.1f}) "
-                     "rotate(-90)'>{}</text>",
-                     (y.from + y.to) / 2, html_escape(y_label));
+    drawing.add_path("axis", {{'M', x.from, y.to}, {'L', x.from, y.from}, {'L', x.to, y.from}});
+    drawing.add_text("label", (x.from + x.to) / 2, y.from + 36, x_label, Anchor::middle);
+    if (y_label.empty()) return;
+    drawing.add_text("label", 13, (y.from + y.to) / 2, y_label, Anchor::middle);
+    drawing.shapes.back().upright = true;
 }
 
-std::string open_plot(const std::string& title, double height, double width,
-                      const std::string& kind) {
-    return fmt::format(
-        "<svg{} viewBox='0 0 {} {}' role='img' aria-label='{}'>"
-        "<text class='name' x='{}' y='18'>{}</text>",
-        kind.empty() ? "" : fmt::format(" class='{}'", kind), width, height, html_escape(title),
-        kPlotLeft, html_escape(title));
+Drawing open_plot(const std::string& title, double height, double width, const std::string& kind) {
+    Drawing drawing{width, height, title, kind, {}};
+    drawing.add_text("name", kPlotLeft, 18, title);
+    return drawing;
 }
 
 double text_width(const std::string& text) {
@@ -310,39 +340,40 @@ std::string fit_text(const std::string& text, double width) {
     return text.substr(0, most > 1 ? most - 1 : 0) + "\u2026";
 }
 
-Legend draw_legend(const std::vector<LegendEntry>& entries, double width) {
+double draw_legend(const std::vector<LegendEntry>& entries, Drawing& drawing) {
     constexpr double kLine = 15, kSwatch = 19, kBetween = 14;
-    Legend legend;
     const bool named = std::any_of(entries.begin(), entries.end(),
                                    [](const LegendEntry& e) { return !e.name.empty(); });
-    if (entries.size() < 2 || !named) return legend;
+    if (entries.size() < 2 || !named) return 0;
     double x = kPlotLeft, y = 34;
     for (std::size_t i = 0; i < entries.size(); ++i) {
+        const int series = static_cast<int>(i);
         const double wide = kSwatch + text_width(entries[i].name) + kBetween;
-        if (x > kPlotLeft && x + wide - kBetween > width - 6) {
+        if (x > kPlotLeft && x + wide - kBetween > drawing.width - 6) {
             x = kPlotLeft;
             y += kLine;
         }
         switch (entries[i].swatch) {
             case LegendEntry::Swatch::line:
-                legend.svg +=
-                    fmt::format("<path class='line s{}' d='M{:.1f} {:.1f}h14'/>", i, x, y - 4);
+                drawing.add_path("line", {{'M', x, y - 4}, {'L', x + 14, y - 4}}, series);
                 break;
             case LegendEntry::Swatch::dot:
-                legend.svg += fmt::format("<circle class='s{}' cx='{:.1f}' cy='{:.1f}' r='3.5'/>",
-                                          i, x + 7, y - 4);
+                drawing.add_circle(x + 7, y - 4, 3.5, series);
                 break;
             case LegendEntry::Swatch::area:
-                legend.svg += fmt::format("<path class='area s{}' d='M{:.1f} {:.1f}h10v-9h-10z'/>",
-                                          i, x + 4, y);
+                drawing.add_path("area",
+                                 {{'M', x + 4, y},
+                                  {'L', x + 14, y},
+                                  {'L', x + 14, y - 9},
+                                  {'L', x + 4, y - 9},
+                                  {'z'}},
+                                 series);
                 break;
         }
-        legend.svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}'>{}</text>", x + kSwatch,
-                                  y, html_escape(entries[i].name));
+        drawing.add_text("tick", x + kSwatch, y, entries[i].name);
         x += wide;
     }
-    legend.height = y - 34 + kLine;
-    return legend;
+    return y - 34 + kLine;
 }
 
 namespace {
@@ -370,32 +401,33 @@ double end_of_axis(const BarPlot& plot) {
     return limit > 0 ? std::min(most, limit) : most;
 }
 
-std::string draw_bar(const BarPlot& plot, const BarPlot::Row& row, double y, const Axis& x) {
-    std::string svg = fmt::format(
-        "<text class='tick' text-anchor='end' x='{:.1f}' y='{:.1f}'>{}<title>{}</title></text>",
-        x.from - 6, y + 9, html_escape(fit_text(row.name, x.from - 12)), html_escape(row.name));
+void draw_bar(const BarPlot& plot, const BarPlot::Row& row, double y, const Axis& x,
+              Drawing& drawing) {
+    drawing.add_text("tick", x.from - 6, y + 9, fit_text(row.name, x.from - 12), Anchor::end);
+    drawing.shapes.back().hint = row.name;
     const auto place = [&](double v) { return x.place(std::min(v, x.high)); };
     double at = 0;
     for (std::size_t p = 0; p < row.parts.size(); ++p) {
-        svg += fmt::format(
-            "<path class='area s{}' d='M{:.1f} {:.1f}H{:.1f}v{}H{:.1f}z'><title>{}, {}: {:.4g}"
-            "</title></path>",
-            p, place(at), y, place(at + row.parts[p]), kBarHeight, place(at), html_escape(row.name),
-            html_escape(p < plot.names.size() ? plot.names[p] : ""), row.parts[p]);
+        const double from = place(at), to = place(at + row.parts[p]), low = y + kBarHeight;
+        drawing.add_path("area",
+                         {{'M', from, y}, {'L', to, y}, {'L', to, low}, {'L', from, low}, {'z'}},
+                         static_cast<int>(p),
+                         fmt::format("{}, {}: {:.4g}", row.name,
+                                     p < plot.names.size() ? plot.names[p] : "", row.parts[p]));
         at += row.parts[p];
     }
     if (row.high > row.low && row.high <= x.high)
-        svg += fmt::format(
-            "<path class='whisker' d='M{:.1f} {:.1f}H{:.1f}'><title>{:.4g} to {:.4g}"
-            "</title></path>",
-            place(row.low), y + kBarHeight / 2, place(row.high), row.low, row.high);
-    return svg + fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}'>{}{:.3g}</text>", x.to + 6,
-                             y + 9, at > x.high ? "\u2192 " : "", at);
+        drawing.add_path(
+            "whisker",
+            {{'M', place(row.low), y + kBarHeight / 2}, {'L', place(row.high), y + kBarHeight / 2}},
+            -1, fmt::format("{:.4g} to {:.4g}", row.low, row.high));
+    drawing.add_text("tick", x.to + 6, y + 9,
+                     fmt::format("{}{:.3g}", at > x.high ? "\u2192 " : "", at));
 }
 
 }  // namespace
 
-std::string svg_bars(const BarPlot& plot) {
+Drawing draw_plot(const BarPlot& plot, DrawnFor place) {
     if (plot.rows.empty()) return {};
     const double rows = kRowHeight * static_cast<double>(plot.rows.size());
     double names = 0;
@@ -406,16 +438,26 @@ std::string svg_bars(const BarPlot& plot) {
     x.widen();
     x.from = std::max(kPlotLeft, std::min(names, kMostNames) + 14);
     x.to = kBarsWidth - kValues;
-    y.from = kPlotTop + rows + 4;
-    y.to = kPlotTop - 2;
-    std::string svg = open_plot(plot.title, y.from + kPlotBottom, kBarsWidth, "bars");
-    svg += draw_axes(plot.x_label, "", x, y);
-    double at = kPlotTop;
+    Drawing drawing = open_plot(plot.title, 0, kBarsWidth, "bars");
+    std::vector<LegendEntry> entries;
+    if (plot.legend_beside && place == DrawnFor::file)
+        for (const std::string& name : plot.names)
+            entries.push_back({name, LegendEntry::Swatch::area});
+    const double down = draw_legend(entries, drawing);
+    y.from = kPlotTop + down + rows + 4;
+    y.to = kPlotTop + down - 2;
+    drawing.height = y.from + kPlotBottom;
+    draw_axes(plot.x_label, "", x, y, drawing);
+    double at = kPlotTop + down;
     for (const BarPlot::Row& row : plot.rows) {
-        svg += draw_bar(plot, row, at, x);
+        draw_bar(plot, row, at, x, drawing);
         at += kRowHeight;
     }
-    return svg + "</svg>\n";
+    return drawing;
+}
+
+std::string svg_bars(const BarPlot& plot) {
+    return svg_inline(draw_plot(plot));
 }
 
 }  // namespace darb

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Plots as inline SVG elements: axes, ticks, units, legends, and values under the pointer. Colours
-// come from the page's CSS (classes s0, s1, ... for the series); see html.h.
+// Plots: axes, ticks, units, legends, and values under the pointer. A plot becomes a drawing, which
+// drawing.h writes as an element of a page, or as a file.
 #pragma once
 
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "engine/report/drawing.h"
 
 namespace darb {
 
@@ -17,6 +19,8 @@ struct PlotSeries {
     bool stairs = false;                   // the line keeps its value until the next point
     std::vector<std::string> titles = {};  // shown for dots under the pointer; empty: name and
                                            // values
+    /// The spread around each point: its lowest and highest y. Empty: none is drawn.
+    std::vector<std::pair<double, double>> band = {};
 };
 
 struct Plot {
@@ -26,10 +30,16 @@ struct Plot {
     bool log_y = false;      // values that are not positive become gaps
     bool from_zero = false;  // the y axis starts at 0
     bool log_x = false;
-    bool x_from_zero = true;  // unless log_x
+    bool x_from_zero = true;     // unless log_x
+    bool legend_beside = false;  // on a page, a legend of several plots names the series
 };
 
-/// The plot as SVG; empty where no series has a point to draw.
+/// Where a drawing is shown: a page may have a legend beside it, a file stands alone.
+enum class DrawnFor { page, file };
+
+/// Empty where no series has a point to draw.
+Drawing draw_plot(const Plot& plot, DrawnFor place = DrawnFor::page);
+/// The plot as an element of a page.
 std::string svg_plot(const Plot& plot);
 
 /// Areas stacked on top of one another, over a common x.
@@ -40,6 +50,7 @@ struct StackPlot {
     std::vector<std::string> names;           // one per layer, lowest first
     std::vector<std::vector<double>> layers;  // [layer][x], not negative
 };
+Drawing draw_plot(const StackPlot& plot, DrawnFor place = DrawnFor::page);
 std::string svg_stack(const StackPlot& plot);
 
 /// One bar per row, divided into the same parts, with a whisker for the spread of the sum.
@@ -53,7 +64,9 @@ struct BarPlot {
     std::string x_label;
     std::vector<std::string> names;  // one per part
     std::vector<Row> rows;
+    bool legend_beside = false;  // as in Plot
 };
+Drawing draw_plot(const BarPlot& plot, DrawnFor place = DrawnFor::page);
 std::string svg_bars(const BarPlot& plot);
 
 /// 3 to 8 round values (1, 2 or 5 times a power of ten apart) that lie within [low, high].

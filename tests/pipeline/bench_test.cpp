@@ -178,9 +178,11 @@ TEST(Growth, Page_saysWhatIsHeld) {
     for (const char* key : {"device", "driver", "processor", "date", "commit"}) context[key] = key;
     context["num_cpus"] = 2;
     const std::string html =
-        growth_html({curve("frame", "splats", 7, 1111), curve("frame", "pixels", 2222, 7),
-                     curve("iteration", "splats", 7, 3333), curve("iteration", "pixels", 4444, 7)},
-                    context);
+        growth_report(
+            {curve("frame", "splats", 7, 1111), curve("frame", "pixels", 2222, 7),
+             curve("iteration", "splats", 7, 3333), curve("iteration", "pixels", 4444, 7)},
+            context)
+            .page();
     for (const char* text :
          {"A frame has 1,111 pixels where splats vary and 2,222 splats where pixels vary;",
           "Adam) has 3,333 pixels where splats vary and 4,444 splats where pixels vary."})

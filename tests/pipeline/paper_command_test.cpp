@@ -98,6 +98,54 @@ TEST(CompareCommand, RunOfDarbTrain_counts_slow) {
     EXPECT_NE(notes.find("Without blending: "), std::string::npos) << notes;
 }
 
+TEST(CompareCommand, AddedSplatsAndMergedReports_slow) {
+    const fs::path out = scratch() / "compare_added", paper = scratch() / "figures";
+    const std::string command = "compare " + kScene +
+                                " --kernels gaussian --iterations 4 -r 8 --effects=none "
+                                "--blending-views 0 -o " +
+                                out.string();
+    ASSERT_EQ(darb(command).code, 0);
+    const fs::path ply = out / "scene/gaussian/seed0/point_cloud/iteration_4/point_cloud.ply";
+    const Outcome added =
+        darb(command + " --flip --paper " + paper.string() + " --add other_one=" + ply.string());
+    ASSERT_EQ(added.code, 0) << added.err;
+    EXPECT_NE(added.out.find("other_one (not trained here)"), std::string::npos) << added.out;
+    const nlohmann::json set = read_json(out / "compare.json")["datasets"][0];
+    const auto &trained = set["runs"][0], &other = set["runs"][1];
+    EXPECT_FALSE(other["trained_here"].get<bool>());
+    EXPECT_TRUE(other["at"][0]["training_s"].is_null());
+    for (const char* value : {"psnr_db", "ssim", "flip"})  // the same splats
+        EXPECT_NEAR(other["at"][0][value].get<double>(), trained["at"][0][value].get<double>(),
+                    1e-3)
+            << value;
+    const std::string tex = read_text_file(paper / "quality-scene-4.tex");
+    EXPECT_NE(tex.find("other\\_one (not trained here)"), std::string::npos) << tex;
+    for (const char* name : {"quality-scene-4.csv", "scene-loss-iterations.pdf",
+                             "scene-loss-iterations.svg", "report.tex"})
+        EXPECT_TRUE(fs::exists(paper / name)) << name;
+    EXPECT_NE(read_text_file(out / "compare.html").find("held-out pictures"), std::string::npos);
+
+    fs::copy_file(out / "compare.json", scratch() / "again.json");
+    const std::string merge = "compare --merge " + (out / "compare.json").string() + " " +
+                              (scratch() / "again.json").string() + " -o ";
+    const Outcome merged = darb(merge + (scratch() / "merged").string());
+    ASSERT_EQ(merged.code, 0) << merged.err;
+    EXPECT_NE(merged.out.find("2 cells are in two reports: 2 agree as printed, 2 of them bit"),
+              std::string::npos)
+        << merged.out;
+    EXPECT_EQ(read_json(scratch() / "merged/compare.json")["repeated"].size(), 2u);
+    nlohmann::json longer = read_json(scratch() / "again.json");
+    longer["iterations"] = {5};
+    write_file_atomic(scratch() / "again.json", longer.dump());
+    expect_refused({{merge + "x", "after 4 iterations and the other after 5"},
+                    {merge + out.string(), "compare.json"},
+                    {"compare --merge one.json -o x", "names one report"},
+                    {command + " --add gaussian=" + ply.string(), "cannot be called"},
+                    {command + " --add 3dgs", "is not NAME=FILE"},
+                    {command + " --add a=/nowhere.ply", "/nowhere.ply"},
+                    {command + " --paper " + ply.string(), "takes a folder"}});
+}
+
 TEST(CompareCommand, CamerasThatKeepTheirLens_areBlendedWithIt_slow) {
     const fs::path set = scratch() / "fisheye", out = scratch() / "compare_fisheye";
     fs::create_directories(set);
@@ -188,8 +236,12 @@ TEST(CompareCommand, RunThatCannotBeRead_isSaidWhereProgressIsNot) {
 
 TEST(PsiCommand, TableJsonAndPage_agree) {
     const fs::path numbers = scratch() / "psi.json", page = scratch() / "psi.html";
-    const Outcome psi = darb("psi --kernel raised_cosine,sinc --samples 4 --cells 32 --json " +
-                             numbers.string() + " --html " + page.string());
+    const fs::path paper = scratch() / "psi_paper";
+    const Outcome psi =
+        darb("psi --kernel raised_cosine,sinc --samples 4 --cells 32 --json " + numbers.string() +
+             " --html " + page.string() + " --paper " + paper.string());
+    EXPECT_NE(read_text_file(paper / "psi.csv").find("\nraised_cosine,"), std::string::npos);
+    EXPECT_NE(read_text_file(paper / "psi.tex").find("raised\\_cosine & "), std::string::npos);
     ASSERT_EQ(psi.code, 0) << psi.err;
     EXPECT_NE(psi.out.find("0.655153"), std::string::npos) << psi.out;
     EXPECT_NE(psi.out.find("psi = 1"), std::string::npos) << psi.out;

@@ -156,7 +156,7 @@ TEST(Cost, small_scene_is_measured_whole) {
     const nlohmann::json json = cost_json(result);
     EXPECT_EQ(json["rows"].size(), result.rows.size());
     EXPECT_EQ(json["rows"][0]["accuracy"]["alpha_cutoff"], "1/255");
-    expect_all_drawn(cost_html(result, "a <scene>"), 3);
+    expect_all_drawn(cost_report(result, "a <scene>").page(), 3);
 }
 
 // Every setting changes some picture of the scene that ships with the sources.
@@ -218,7 +218,7 @@ TEST(TrainCost, prices_every_setting_of_training_long) {
     EXPECT_TRUE(names.contains("rates and rounds of a long run"));
     EXPECT_TRUE(names.contains("sh degree 2 by the iteration"));
     EXPECT_EQ(train_cost_json(result)["rows"].size(), result.rows.size());
-    expect_all_drawn(train_cost_html(result), 3);
+    expect_all_drawn(train_cost_report(result).page(), 3);
 }
 
 TEST(TrainCost, has_the_exact_footprint_where_the_kernel_has_it) {

@@ -164,4 +164,40 @@ Json result_json(const BenchResult& r, const DeviceRates& rates) {
     return json;
 }
 
+Report bench_report(const std::vector<BenchResult>& results, const DeviceRates& rates,
+                    const Json& context) {
+    Report report("Benchmarks", context["device"].get<std::string>() + ", " +
+                                    context["driver"].get<std::string>());
+    using Kind = TableColumn::Kind;
+    Table table{"benchmarks", "Benchmarks", "Medians and quartiles of the wall clock.", {}, {}};
+    Table passes{"passes", "Passes", "Medians and quartiles of the device's timestamps.", {}, {}};
+    table.columns = {{"benchmark", "", Better::neither, 0, Kind::name},
+                     {"time", "ms", Better::neither, 3},
+                     {"splats", "", Better::neither, 0},
+                     {"intersections", "", Better::neither, 0},
+                     {"of the roofline", "%", Better::neither, 0},
+                     {"runs", "", Better::neither, 0}};
+    passes.columns = {{"benchmark", "", Better::neither, 0, Kind::name},
+                      {"pass", "", Better::neither, 0, Kind::name},
+                      {"time", "ms", Better::neither, 3},
+                      {"of the roofline", "%", Better::neither, 0}};
+    const auto timed = [](const Spread& ms) {
+        TableCell cell(ms.median);
+        cell.span = {ms.low, ms.high};
+        return cell;
+    };
+    const auto above_zero = [](double v) { return v > 0 ? TableCell(v) : TableCell(); };
+    for (const BenchResult& r : results) {
+        table.rows.push_back(
+            {{r.name, timed(r.ms), above_zero(r.counts.splats), above_zero(r.counts.intersections),
+              above_zero(100 * roofline_share(r, rates)), double(runs(r))}});
+        for (const PassFigure& pass : r.passes)
+            passes.rows.push_back(
+                {{r.name, pass.name, timed(pass.ms), above_zero(100 * pass.share)}});
+    }
+    report.table(std::move(table), 2);
+    report.table(std::move(passes), 2);
+    return report;
+}
+
 }  // namespace darb

@@ -8,8 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "engine/gpu/device.h"
+#include "engine/report/report.h"
 #include "tools/bench/measure.h"
 
 namespace darb {
@@ -23,6 +25,10 @@ std::string context_text(const nlohmann::json& context);
 /// details: below the case's line, add one line per pass and yardstick.
 std::string result_text(const BenchResult& result, const DeviceRates& rates, bool details);
 nlohmann::json result_json(const BenchResult& result, const DeviceRates& rates);
+
+/// A table of the cases, and one of their passes. context: context_json().
+Report bench_report(const std::vector<BenchResult>& results, const DeviceRates& rates,
+                    const nlohmann::json& context);
 
 // The commit that the program was built from.
 

@@ -10,7 +10,6 @@
 
 #include "engine/core/error.h"
 #include "engine/report/html.h"
-#include "engine/report/svg_plot.h"
 #include "tools/bench/cases.h"
 #include "trainer/step/trainer.h"
 
@@ -186,17 +185,16 @@ Plot pass_plot(const GrowthCurve& curve) {
     return plot;
 }
 
-std::string page_table(const GrowthCurve& curve) {
-    std::string html = fmt::format(
-        "<h2>{} by {}</h2><div class='wide'><table><tr><th>splats</th><th>pixels</th>"
-        "<th>intersections</th><th>ms</th><th>quartiles</th></tr>\n",
-        curve.name, curve.by);
+Table points_table(const GrowthCurve& curve) {
+    Table table{"", fmt::format("{} by {}", curve.name, curve.by), "", {}, {}};
+    for (const char* name : {"splats", "pixels", "intersections"})
+        table.columns.push_back({name, "", Better::neither, 0});
+    for (const char* name : {"ms", "quartiles"})
+        table.columns.push_back({name, "", Better::neither, 3});
     for (const GrowthPoint& p : curve.points)
-        html += fmt::format(
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.3f}</td><td>{:.3f} to {:.3f}</td></tr>\n",
-            format_number(p.splats), format_number(p.pixels), format_number(p.intersections),
-            p.ms.median, p.ms.low, p.ms.high);
-    return html + "</table></div>\n";
+        table.rows.push_back({{p.splats, p.pixels, p.intersections, p.ms.median,
+                               TableCell::between(p.ms.low, p.ms.high)}});
+    return table;
 }
 
 }  // namespace
@@ -244,33 +242,36 @@ Json growth_json(const std::vector<GrowthCurve>& curves) {
     return all;
 }
 
-std::string growth_html(const std::vector<GrowthCurve>& curves, const Json& context) {
+Report growth_report(const std::vector<GrowthCurve>& curves, const Json& context) {
     Plot splats = log_plot("By splats", "splats"), pixels = log_plot("By pixels", "pixels"),
          intersections = log_plot("By splat-tile intersections", "intersections");
-    std::string passes, tables;
+    std::vector<Figure> passes;
     for (const GrowthCurve& curve : curves) {
         (curve.by == "splats" ? splats : pixels)
             .series.push_back(series(curve.name, curve.points, curve.by));
-        passes += svg_plot(pass_plot(curve));
-        tables += page_table(curve);
+        passes.push_back({"", pass_plot(curve)});
     }
     for (const char* name : {"frame", "iteration"})
         intersections.series.push_back(
             series(name, points_by_splats(curves, name), "intersections"));
-    return html_page(
+    Report report(
         "Growth",
         fmt::format("{}, {}; {} x {}; {}; darb {}", context["device"].get<std::string>(),
                     context["driver"].get<std::string>(), context["num_cpus"].get<unsigned>(),
                     context["processor"].get<std::string>(), context["date"].get<std::string>(),
-                    context["commit"].get<std::string>()),
-        "<div class='plots'>" + svg_plot(splats) + svg_plot(pixels) + svg_plot(intersections) +
-            passes + "</div>\n" + tables +
-            "<h2>How to read it</h2><p>Random splats in the unit sphere, seen from outside, degree "
-            "0. A frame has " +
-            held_text(curves, "frame") + "; an iteration (forward, loss, backward, Adam) has " +
-            held_text(curves, "iteration") +
-            ". Time is that of the wall clock, the median; exponents b of ms = a x^b are fitted "
-            "over the largest decade, where fixed costs no longer rule.</p>\n");
+                    context["commit"].get<std::string>()));
+    std::vector<Figure> figures{{"", splats}, {"", pixels}, {"", intersections}};
+    figures.insert(figures.end(), passes.begin(), passes.end());
+    report.plots(std::move(figures));
+    for (const GrowthCurve& curve : curves) report.table(points_table(curve), 2);
+    report.html(
+        "<h2>How to read it</h2><p>Random splats in the unit sphere, seen from outside, degree "
+        "0. A frame has " +
+        held_text(curves, "frame") + "; an iteration (forward, loss, backward, Adam) has " +
+        held_text(curves, "iteration") +
+        ". Time is that of the wall clock, the median; exponents b of ms = a x^b are fitted "
+        "over the largest decade, where fixed costs no longer rule.</p>\n");
+    return report;
 }
 
 }  // namespace darb

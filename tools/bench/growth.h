@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/report/report.h"
 #include "tools/bench/measure.h"
 
 namespace darb {
@@ -43,7 +44,7 @@ double growth_exponent(const std::vector<GrowthPoint>& points, const std::string
 
 std::string growth_table(const std::vector<GrowthCurve>& curves);
 nlohmann::json growth_json(const std::vector<GrowthCurve>& curves);
-/// A whole page without external resources. context: context_json().
-std::string growth_html(const std::vector<GrowthCurve>& curves, const nlohmann::json& context);
+/// context: context_json().
+Report growth_report(const std::vector<GrowthCurve>& curves, const nlohmann::json& context);
 
 }  // namespace darb

@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <utility>
 
 #include "engine/report/html.h"
-#include "engine/report/svg_plot.h"
 
 namespace darb {
 
@@ -92,8 +92,8 @@ namespace {
 
 /// Alone, combinations and the front as three series over ms.
 template <class Value>
-std::string scatter(const CostResult& result, const std::string& title, const std::string& unit,
-                    const Value& value, bool CostRow::*front) {
+Figure scatter(const CostResult& result, const std::string& title, const std::string& unit,
+               const Value& value, bool CostRow::*front) {
     Plot plot{title, "ms a frame", unit, {}};
     plot.log_x = true;
     plot.series = {{"settings alone", {}, true, false, false, {}},
@@ -111,16 +111,16 @@ std::string scatter(const CostResult& result, const std::string& title, const st
     std::sort(best.begin(), best.end(),
               [](const CostRow* a, const CostRow* b) { return a->ms.median < b->ms.median; });
     for (const CostRow* row : best) plot.series[2].points.emplace_back(row->ms.median, value(*row));
-    return svg_plot(plot);
+    return {"", plot};
 }
 
 bool is_combination(const CostResult& result, const CostRow& row) {
     return row.setting < 0 && &row != result.rows.data();
 }
 
-std::string pass_bars(const CostResult& result, bool combinations, const std::string& title,
-                      std::vector<std::string>& names) {
-    BarPlot plot{title, "ms a frame; whiskers: quartiles of the repeats", {}, {}};
+Figure pass_bars(const CostResult& result, bool combinations, const std::string& title,
+                 std::vector<std::string>& names) {
+    BarPlot plot{title, "ms a frame; whiskers: quartiles of the repeats", {}, {}, true};
     for (const CostRow& row : result.rows)
         for (const auto& [name, spread] : row.passes)
             if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
@@ -136,33 +136,31 @@ std::string pass_bars(const CostResult& result, bool combinations, const std::st
                                           names.begin())] = spread.median;
         plot.rows.push_back(std::move(bar));
     }
-    return svg_bars(plot);
+    return {"", plot};
 }
 
-std::string table(const CostResult& result) {
-    const bool photos = result.rows[0].photo_psnr_db.has_value();
-    std::string html =
-        "<h2>Every measured row</h2><div class='wide'><table><tr><th>setting</th><th>ms a "
-        "frame</th>"
-        "<th>quartiles</th><th>PSNR (dB)</th><th>largest error</th><th>99.9 %</th>"
-        "<th>PSNR, by pixel (dB)</th>";
-    if (photos) html += "<th>photos (dB)</th><th>SSIM</th>";
-    html += "</tr>\n";
+Table every_row(const CostResult& result) {
+    using Kind = TableColumn::Kind;
+    Table table{"settings", "Every measured row", "", {}, {}};
+    table.columns = {{"setting", "", Better::neither, 0, Kind::prose},
+                     {"ms a frame", "", Better::neither, 3},
+                     {"quartiles", "", Better::neither, 3},
+                     {"PSNR", "dB"},
+                     {"largest error", "", Better::neither, 5},
+                     {"99.9 %", "", Better::neither, 5},
+                     {"PSNR, by pixel", "dB"},
+                     {"photos", "dB", Better::neither, 3},
+                     {"SSIM", "", Better::neither, 4}};
     for (const CostRow& row : result.rows) {
         const bool same = row.same_as_balanced && &row != result.rows.data();
-        html += fmt::format(
-            "<tr{}><td class='text'>{}{}</td><td>{:.3f}</td><td>{:.3f} to "
-            "{:.3f}</td><td>{:.2f}</td>"
-            "<td>{:.5f}</td><td>{:.5f}</td><td>{:.2f}</td>",
-            row.on_front ? " class='mark'" : "", html_escape(row.name),
-            same ? " (same picture as balanced)" : "", row.ms.median, row.ms.low, row.ms.high,
-            row.error.psnr_db, row.error.largest, row.error.percentile, row.error_by_pixel.psnr_db);
-        if (photos)
-            html +=
-                fmt::format("<td>{:.3f}</td><td>{:.4f}</td>", *row.photo_psnr_db, *row.photo_ssim);
-        html += "</tr>\n";
+        table.rows.push_back(
+            {{row.name + (same ? " (same picture as balanced)" : ""), row.ms.median,
+              TableCell::between(row.ms.low, row.ms.high), row.error.psnr_db, row.error.largest,
+              row.error.percentile, row.error_by_pixel.psnr_db, row.photo_psnr_db, row.photo_ssim},
+             true,
+             row.on_front});
     }
-    return html + "</table></div>\n";
+    return table;
 }
 
 std::string notes(const CostResult& result) {
@@ -188,31 +186,33 @@ std::string notes(const CostResult& result) {
 
 }  // namespace
 
-std::string cost_html(const CostResult& result, const std::string& title) {
+Report cost_report(const CostResult& result, const std::string& title) {
+    Report report(title,
+                  fmt::format("What accuracy costs in time: {} splats, {}, footprint {}; {}, {}",
+                              format_number(static_cast<double>(result.splats)), result.kernel,
+                              result.footprint, result.device, result.driver));
     std::string answers;
     for (const std::string& answer : cost_answers(result))
         answers += "<li>" + html_escape(answer) + "</li>\n";
-    std::string plots = scatter(
+    report.heading("In words");
+    report.html("<ul>" + answers + "</ul>\n");
+    report.heading("Accuracy against time");
+    std::vector<Figure> fronts{scatter(
         result, "Time and distance from the truth", "PSNR against the truth (dB)",
-        [](const CostRow& r) { return r.error.psnr_db; }, &CostRow::on_front);
+        [](const CostRow& r) { return r.error.psnr_db; }, &CostRow::on_front)};
     if (result.rows[0].photo_psnr_db)
-        plots += scatter(
+        fronts.push_back(scatter(
             result, "Time and photos", "PSNR against the photos (dB)",
-            [](const CostRow& r) { return *r.photo_psnr_db; }, &CostRow::on_photo_front);
+            [](const CostRow& r) { return *r.photo_psnr_db; }, &CostRow::on_photo_front));
+    report.plots(std::move(fronts));
     std::vector<std::string> names;
-    const std::string alone = pass_bars(result, false, "Each setting alone", names);
-    const std::string together = pass_bars(result, true, "Presets and the front", names);
-    const std::string subtitle =
-        fmt::format("What accuracy costs in time: {} splats, {}, footprint {}; {}, {}",
-                    format_number(static_cast<double>(result.splats)), result.kernel,
-                    result.footprint, result.device, result.driver);
-    return html_page(title, subtitle,
-                     "<h2>In words</h2><ul>" + answers +
-                         "</ul>\n<h2>Accuracy against time</h2>"
-                         "<div class='plots'>" +
-                         plots + "</div>\n<h2>Time per pass</h2>" + html_legend(names) +
-                         "<div class='plots'>" + alone + together + "</div>\n" + table(result) +
-                         notes(result));
+    const Figure alone = pass_bars(result, false, "Each setting alone", names);
+    const Figure together = pass_bars(result, true, "Presets and the front", names);
+    report.heading("Time per pass");
+    report.plots({alone, together}, names);
+    report.table(every_row(result), 2);
+    report.html(notes(result));
+    return report;
 }
 
 }  // namespace darb

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "engine/report/report.h"
 #include "tools/cost/accuracy_cost.h"
 
 namespace darb {
@@ -12,7 +13,7 @@ namespace darb {
 nlohmann::json spread_json(const Spread& spread);
 std::string cost_table(const CostResult& result);
 nlohmann::json cost_json(const CostResult& result);
-/// A whole page without external resources. title: name of the scene.
-std::string cost_html(const CostResult& result, const std::string& title);
+/// title: name of the scene.
+Report cost_report(const CostResult& result, const std::string& title);
 
 }  // namespace darb

@@ -12,7 +12,6 @@
 #include "engine/core/error.h"
 #include "engine/reference/reference_loss.h"
 #include "engine/report/html.h"
-#include "engine/report/svg_plot.h"
 #include "tools/cost/cost_report.h"
 #include "trainer/growth/initial_model.h"
 #include "trainer/options/schedule.h"
@@ -368,24 +367,29 @@ std::string seconds_text(const TrainCostRow& row, size_t target, int seeds) {
     return text;
 }
 
-std::string numbers(const TrainCostResult& result) {
-    std::string html =
-        "<h2>Every setting</h2><div class='wide'><table><tr><th>setting</th><th>gradient error</th>"
-        "<th>ms an iteration</th><th>quartiles</th><th>PSNR (dB)</th><th>quartiles</th>";
+Table every_setting(const TrainCostResult& result) {
+    using Kind = TableColumn::Kind;
+    Table table{"settings", "Every setting", "", {}, {}};
+    table.columns = {{"setting", "", Better::neither, 0, Kind::prose},
+                     {"gradient error", "", Better::neither, 2, Kind::scientific},
+                     {"ms an iteration", "", Better::neither, 3},
+                     {"quartiles", "", Better::neither, 3},
+                     {"PSNR", "dB", Better::neither, 3},
+                     {"quartiles", "", Better::neither, 3}};
     for (const double target : result.targets)
-        html += fmt::format("<th>s to {:.2f} dB</th>", target);
-    html += "</tr>\n";
+        table.columns.push_back({fmt::format("s to {:.2f} dB", target)});
     for (const TrainCostRow& row : result.rows) {
-        html += fmt::format(
-            "<tr><td class='text'>{}</td><td>{}</td><td>{:.3f}</td><td>{:.3f} to {:.3f}</td>"
-            "<td>{:.3f}</td><td>{:.3f} to {:.3f}</td>",
-            html_escape(row.name), error_text(row), row.ms.median, row.ms.low, row.ms.high,
-            row.psnr_db.median, row.psnr_db.low, row.psnr_db.high);
+        TableRow& cells = table.rows.emplace_back();
+        cells.cells = {row.name,
+                       row.gradient_error ? TableCell(row.gradient_error->median) : TableCell("-"),
+                       row.ms.median,
+                       TableCell::between(row.ms.low, row.ms.high),
+                       row.psnr_db.median,
+                       TableCell::between(row.psnr_db.low, row.psnr_db.high)};
         for (size_t t = 0; t < result.targets.size(); ++t)
-            html += "<td>" + seconds_text(row, t, result.seeds) + "</td>";
-        html += "</tr>\n";
+            cells.cells.push_back(seconds_text(row, t, result.seeds));
     }
-    return html + "</table></div>\n";
+    return table;
 }
 
 }  // namespace
@@ -436,7 +440,7 @@ Json train_cost_json(const TrainCostResult& result) {
             {"rows", rows}};
 }
 
-std::string train_cost_html(const TrainCostResult& result) {
+Report train_cost_report(const TrainCostResult& result) {
     Plot ends{"Time and quality", "ms an iteration", "PSNR, held out (dB)", {}};
     ends.log_x = true;
     ends.series = {{"settings", {}, true, false, false, {}}};
@@ -459,19 +463,20 @@ std::string train_cost_html(const TrainCostResult& result) {
         if (shown && !row.change)
             curves.series.push_back({row.name, row.curve, true, true, false, {}});
     }
-    return html_page(
-        result.dataset,
-        fmt::format("What accuracy costs in training: seeds {}, iterations {}; {}, {}",
-                    result.seeds, result.iterations, result.device, result.driver),
-        "<div class='plots'>" + svg_plot(ends) + svg_plot(gradients) + svg_plot(curves) +
-            "</div>\n" + numbers(result) +
-            "<h2>How to read it</h2><p>Each setting alone, the presets, and what training does "
-            "beside the settings, each turned the other way; row after row within a "
-            "seed, so that drift hits all alike. Quartiles over the seeds. Gradient error: "
-            "|g - g*| / |g*|, mean over the kinds of parameters, median over three photos, of the "
-            "scene that balanced trained, g* in double precision with the true kernel profile, "
-            "cut-off 1/1024 "
-            "and stop 1e-6. Seconds count training alone.</p>\n");
+    Report report(result.dataset,
+                  fmt::format("What accuracy costs in training: seeds {}, iterations {}; {}, {}",
+                              result.seeds, result.iterations, result.device, result.driver));
+    report.plots({{"", ends}, {"", gradients}, {"", curves}});
+    report.table(every_setting(result), 2);
+    report.html(
+        "<h2>How to read it</h2><p>Each setting alone, the presets, and what training does "
+        "beside the settings, each turned the other way; row after row within a "
+        "seed, so that drift hits all alike. Quartiles over the seeds. Gradient error: "
+        "|g - g*| / |g*|, mean over the kinds of parameters, median over three photos, of the "
+        "scene that balanced trained, g* in double precision with the true kernel profile, "
+        "cut-off 1/1024 "
+        "and stop 1e-6. Seconds count training alone.</p>\n");
+    return report;
 }
 
 }  // namespace darb

@@ -12,6 +12,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/ranks/ranks.h"
+#include "engine/report/report.h"
 #include "tools/cost/accuracy_cost.h"
 #include "trainer/options/schedule.h"
 
@@ -56,6 +57,6 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
 
 std::string train_cost_table(const TrainCostResult& result);
 nlohmann::json train_cost_json(const TrainCostResult& result);
-std::string train_cost_html(const TrainCostResult& result);
+Report train_cost_report(const TrainCostResult& result);
 
 }  // namespace darb

@@ -10,6 +10,7 @@
 #include <memory>
 #include <regex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/core/error.h"
@@ -55,15 +56,20 @@ void add_growth_flags(CLI::App& command, GrowthFlags& flags);
 /// cases. Throws Error where the flags contradict each other.
 void check_growth(const GrowthFlags& flags, const std::string& filter);
 
+/// Where the results go, beside the page.
+struct BenchOutputs {
+    std::filesystem::path json, paper;
+    bool quiet = false;
+};
 void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,
-                  const std::filesystem::path& json, bool quiet,
+                  const BenchOutputs& outputs,
                   const std::function<void(const std::string&)>& progress);
 
 namespace {
 
 struct BenchFlags {
     std::string filter, device, note;  // filter: also the path of a scene
-    std::filesystem::path data, json, dataset;
+    std::filesystem::path data, json, dataset, paper;
     BenchOptions options;
     GrowthFlags growth;
     TuneFlags tune;
@@ -73,20 +79,24 @@ struct BenchFlags {
 void run_cases(Device& device, const DeviceRates& rates, const std::vector<BenchCase>& cases,
                const BenchFlags& flags, const nlohmann::json& context) {
     nlohmann::json json{{"context", context}, {"benchmarks", nlohmann::json::array()}};
+    std::vector<BenchResult> results;
     for (const BenchCase& one : cases) {
         BenchResult result = one.run(device, rates, flags.options);
         result.name = one.name;
         tell(stream_beside_json(flags.json, flags.quiet), "{}",
              result_text(result, rates, !flags.brief));
         json["benchmarks"].push_back(result_json(result, rates));
+        results.push_back(std::move(result));
         // kept even if a later case ends the run
         if (flags.json != "-") write_json(flags.json, json);
     }
     if (flags.json == "-") write_json(flags.json, json);
+    write_paper(flags.paper, bench_report(results, rates, context), {});
 }
 
 int bench(BenchFlags flags) {
     check_growth(flags.growth, flags.filter);
+    check_paper_folder(flags.paper);
     std::vector<BenchCase> cases = chosen_cases(flags.filter, flags.dataset, flags.options.full);
     for (const BenchCase& one : cases)
         if (flags.list) tell("{}\n", one.name);
@@ -117,10 +127,11 @@ int bench(BenchFlags flags) {
     const nlohmann::json context = context_json(device, rates, flags.note);
     tell(stream_beside_json(flags.json, flags.quiet), "{}", context_text(context));
     if (flags.growth.on)
-        bench_growth(device, flags.growth, context, flags.json, flags.quiet, options.progress);
+        bench_growth(device, flags.growth, context, {flags.json, flags.paper, flags.quiet},
+                     options.progress);
     else
         run_cases(device, rates, cases, flags, context);
-    tell_paths(flags.quiet, {flags.json, flags.growth.html});
+    tell_paths(flags.quiet, {flags.json, flags.growth.html, flags.paper});
     return 0;
 }
 
@@ -137,6 +148,7 @@ void add_bench(CLI::App& app, Action& action) {
                         "folder of the data sets and of splats/; default: $DARB_TEST_DATA, else "
                         "../shared/data");
     add_json_option(*command, flags->json);
+    add_paper_option(*command, flags->paper);
     command->add_option("--note", flags->note, "a note about the machine, kept in the file");
     command->add_flag("--full", flags->options.full,
                       "a longer preparation: fox_800 after 7,000 iterations, not 1,000");
@@ -211,12 +223,14 @@ void check_growth(const GrowthFlags& flags, const std::string& filter) {
 }
 
 void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,
-                  const std::filesystem::path& json, bool quiet,
+                  const BenchOutputs& outputs,
                   const std::function<void(const std::string&)>& progress) {
     const std::vector<GrowthCurve> curves = measure_growth(device, flags.plan, progress);
-    write_json(json, {{"context", context}, {"growth", growth_json(curves)}});
-    if (!flags.html.empty()) write_file_atomic(flags.html, growth_html(curves, context));
-    tell(stream_beside_json(json, quiet), "{}", growth_table(curves));
+    write_json(outputs.json, {{"context", context}, {"growth", growth_json(curves)}});
+    const Report report = growth_report(curves, context);
+    if (!flags.html.empty()) write_file_atomic(flags.html, report.page());
+    write_paper(outputs.paper, report, {});
+    tell(stream_beside_json(outputs.json, outputs.quiet), "{}", growth_table(curves));
 }
 
 }  // namespace darb

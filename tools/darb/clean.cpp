@@ -44,7 +44,7 @@ constexpr double kIsolatedShare = 0.01;  // of the heaviest part, where no rule 
 constexpr int kLightWidth = 480;         // px, of the pictures whose light is measured
 
 struct CleanFlags {
-    std::filesystem::path scene, photos, cameras, output, json;
+    std::filesystem::path scene, photos, cameras, output, json, paper;
     std::optional<double> isolated;               // share of the heaviest part
     std::string haze;                             // OPACITY,SIZE; empty: off
     std::uint32_t free_space = 0, few_views = 0;  // views; 0: off
@@ -260,6 +260,32 @@ void tell_report(std::FILE* out, const std::vector<Rule>& rules, const Rule& tog
              judged->before, judged->after);
 }
 
+Report paper_report(const CleanFlags& flags, const std::vector<Rule>& rules, const Rule& together,
+                    const std::optional<Judgement>& judged) {
+    Report report("Cleaning", name_in_json(flags.paper, flags.scene));
+    Table table{"rules", "What each rule leaves out", "", {}, {}};
+    table.columns = {{"rule", "", Better::neither, 0, TableColumn::Kind::name},
+                     {"splats", "", Better::neither, 0},
+                     {"of the splats", "%", Better::neither, 1},
+                     {"of the light", "%"}};
+    const auto add = [&](const Rule& rule, bool ranked) {
+        const double count = double(count_of(rule.set));
+        table.rows.push_back(
+            {{rule.name, count, 100 * count / double(rule.set.size()), 100 * rule.light}, ranked});
+    };
+    for (const Rule& rule : rules) add(rule, true);
+    if (rules.size() > 1) add(together, false);
+    report.table(std::move(table));
+    if (!judged) return report;
+    Table photos{"held out",
+                 "Held-out photos",
+                 fmt::format("Means over {} photos.", judged->views),
+                 {{"", "", Better::neither, 0, TableColumn::Kind::name}, {"PSNR", "dB"}},
+                 {{{"before", judged->before}}, {{"after", judged->after}}}};
+    report.table(std::move(photos));
+    return report;
+}
+
 SplatFormat checked_format(const CleanFlags& flags) {
     const std::optional<SplatFormat> format = format_to_write(flags.output);
     if (!format)
@@ -291,6 +317,7 @@ void write_cleaned(const CleanFlags& flags, SplatFormat format, const Paths& inp
 
 int clean(CleanFlags flags) {
     check_named(flags);
+    check_paper_folder(flags.paper);
     const Paths inputs =
         together({files_of(flags.scene), files_of(flags.cameras), files_of(flags.photos)});
     refuse_to_overwrite_inputs({flags.output, flags.json}, inputs, Replaces::all);
@@ -329,11 +356,13 @@ int clean(CleanFlags flags) {
     const std::optional<Judgement> judged = judge(device, photos, effects, model, kept);
     if (!flags.dry_run) write_cleaned(flags, format, inputs, written, kept);
     write_json(flags.json, report_json(flags, rules, all, judged));
+    write_paper(flags.paper, paper_report(flags, rules, all, judged),
+                together({inputs, files_of(photos.views), {flags.output}}));
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
     tell_report(out, rules, all, judged);
     if (!flags.dry_run)
         tell(out, "{}: {} of {} splats\n", flags.output.string(), kept.size(), model.size());
-    tell_paths(flags.quiet, {flags.output, flags.json});
+    tell_paths(flags.quiet, {flags.output, flags.json, flags.paper});
     return 0;
 }
 
@@ -387,6 +416,7 @@ void add_clean(CLI::App& app, Action& action) {
     command->add_option("-r,--resolution", flags->data.resolution,
                         "of the photos: 1, 2, 4 or 8 to divide their size, or a width in px");
     add_json_option(*command, flags->json);
+    add_paper_option(*command, flags->paper);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
     add_quiet_flag(*command, flags->quiet);

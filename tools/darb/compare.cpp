@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <functional>
@@ -20,6 +21,8 @@
 #include "engine/core/system.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/dataset.h"
+#include "engine/data/image_io.h"
+#include "engine/data/metrics.h"
 #include "engine/data/run_colmap.h"
 #include "engine/gpu/device.h"
 #include "engine/kernels/kernel_family.h"
@@ -33,10 +36,12 @@
 #include "tools/darb/scene_evaluation.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
+#include "tools/paper/compare_merge.h"
 #include "tools/paper/compare_report.h"
 #include "tools/paper/compare_runs.h"
 #include "tools/paper/compare_stats.h"
 #include "trainer/job/job.h"
+#include "trainer/job/scene_file.h"
 #include "trainer/job/training_data.h"
 #include "trainer/options/strategy.h"
 #include "trainer/run/run_folder.h"
@@ -60,6 +65,8 @@ class RunMeasurer {
 
     /// Measures everything but blending.
     void measure(ComparedRun& run);
+    /// Measures splats of another program on these views, and keeps their pictures.
+    ComparedRun measure_added(const AddedMethod& method, const std::vector<View>& held_out);
     /// Measures the first complete run of each kernel, all on one device, because the times are
     /// compared.
     void measure_blending(std::vector<ComparedRun>& runs, const std::vector<View>& held_out) const;
@@ -96,6 +103,7 @@ void check_flags(CompareFlags& flags) {
                         "Rename one folder: the name tells their runs apart.");
         names.push_back(name);
     }
+    check_paper_folder(flags.paper);
     std::sort(flags.iterations.begin(), flags.iterations.end());
     flags.iterations.erase(std::unique(flags.iterations.begin(), flags.iterations.end()),
                            flags.iterations.end());
@@ -103,10 +111,12 @@ void check_flags(CompareFlags& flags) {
         flags.forwarded.push_back("--max-splats=" + std::to_string(flags.max_splats));
     if (flags.html.empty()) flags.html = flags.output / "compare.html";
     if (flags.json.empty()) flags.json = flags.output / "compare.json";
+    Paths added;
+    for (const AddedMethod& method : added_methods(flags)) added.push_back(method.file);
     for (const std::string& dataset : flags.datasets)
         refuse_to_overwrite_inputs(
             {flags.json, flags.html},
-            together({files_of(dataset_path(dataset)), flags.lpips, flags.kernel_files}));
+            together({files_of(dataset_path(dataset)), flags.lpips, flags.kernel_files, added}));
 }
 
 // Paths as seen from the file.
@@ -116,6 +126,27 @@ nlohmann::json shared_json(Comparison comparison, const std::filesystem::path& f
         for (ComparedRun& run : dataset.runs) run.folder = name_in_json(file, run.folder);
     }
     return comparison_json(comparison);
+}
+
+/// What all its data sets share.
+void take_head(const CompareFlags& flags, const std::vector<int>& kernels, Comparison& comparison) {
+    for (const int kernel : kernels) comparison.kernels.emplace_back(kernel_name(kernel));
+    for (const AddedMethod& method : added_methods(flags))
+        if (std::find(comparison.added.begin(), comparison.added.end(), method.name) ==
+            comparison.added.end())
+            comparison.added.push_back(method.name);
+    comparison.kernels.insert(comparison.kernels.end(), comparison.added.begin(),
+                              comparison.added.end());
+    comparison.iterations = flags.iterations;
+    comparison.scales = flags.scales;
+    comparison.seeds = flags.seeds;
+    comparison.settings = settings_of(flags);
+    DeviceOptions options = command_device(flags.device);
+    {
+        const Device device(options);
+        comparison.machines = {{device.info().name, device.info().driver}};
+        comparison.device = device.info().name + ", " + device.info().driver;
+    }
 }
 
 int compare(Ranks& ranks, CompareFlags flags) {
@@ -131,16 +162,7 @@ int compare(Ranks& ranks, CompareFlags flags) {
             throw Error("--effects with cameras", "has no place in compare, which has one for all",
                         "Leave cameras out: darb eval measures runs that refine theirs.");
     }
-    for (const int kernel : kernels) comparison.kernels.emplace_back(kernel_name(kernel));
-    comparison.iterations = flags.iterations;
-    comparison.scales = flags.scales;
-    comparison.seeds = flags.seeds;
-    comparison.settings = settings_of(flags);
-    DeviceOptions options = command_device(flags.device);
-    {
-        const Device device(options);
-        comparison.device = device.info().name + ", " + device.info().driver;
-    }
+    take_head(flags, kernels, comparison);
     std::optional<RunLock> lock;
     if (ranks.is_first()) lock.emplace(flags.output);
     const std::atomic<bool>& stop = stop_on_signals();
@@ -156,7 +178,9 @@ int compare(Ranks& ranks, CompareFlags flags) {
         for (const ComparedRun& run : comparison.datasets.back().runs)
             if (exit_code != 1 && run.exit_code != 0) exit_code = run.exit_code;
         if (flags.json != "-") write_json(flags.json, shared_json(comparison, flags.json));
-        write_file_atomic(flags.html, comparison_html(comparison));
+        const Report report = comparison_report(comparison);
+        write_file_atomic(flags.html, report.page());
+        write_paper(flags.paper, report, {});
     }
     if (!ranks.is_first()) return 0;
     if (flags.json == "-") write_json(flags.json, shared_json(comparison, flags.json));
@@ -186,6 +210,7 @@ void add_compare(CLI::App& app, Action& action) {
     add_compare_flags(*command, *flags);
     command->callback([flags, &action] {
         action = [flags] {
+            if (!flags->merge.empty()) return merge_reports(*flags);
             return with_ranks([&](Ranks& ranks) {
                 try {
                     return compare(ranks, *flags);
@@ -233,6 +258,7 @@ std::string settings_of(const CompareFlags& flags) {
 void leave_folders_out(ComparedDataset& dataset, const CompareFlags& flags) {
     std::vector<std::filesystem::path> paths = paths_in_options(flags);
     paths.insert(paths.end(), {dataset_path(dataset.path.string()), flags.output});
+    for (const AddedMethod& method : added_methods(flags)) paths.push_back(method.file);
     for (ComparedRun& run : dataset.runs)
         for (std::string* text : {&run.failure, &run.notes})
             for (const std::filesystem::path& path : paths) *text = without_folders(*text, path);
@@ -386,12 +412,18 @@ ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset
     check_same_runs(ranks, flags, dataset, kernels, comparer->fingerprint(),
                     comparer->measurer().measurements());
     refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(comparer->views()));
+    result.fingerprint = comparer->fingerprint();
+    result.width = comparer->held_out().front().camera.width;
+    result.height = comparer->held_out().front().camera.height;
     const std::vector<ComparedRun> own = comparer->runs(kernels, ranks, stop);
     result.runs = runs_of_all(ranks, own, kernels.size() * static_cast<std::size_t>(flags.seeds));
     for (const ComparedRun& run : result.runs)
         if (std::none_of(own.begin(), own.end(),
                          [&](const ComparedRun& its) { return its.folder == run.folder; }))
             say_what_went_wrong(run);
+    for (const AddedMethod& method : added_methods(flags))
+        if (method.dataset == result.name && ranks.is_first() && !stop)
+            result.runs.push_back(comparer->measurer().measure_added(method, comparer->held_out()));
     if (ranks.is_first() && !stop)
         comparer->measurer().measure_blending(result.runs, comparer->held_out());
     return result;
@@ -412,10 +444,35 @@ void forward(CLI::App& command, CompareFlags& flags, const std::string& names,
         help);
 }
 
+/// What is measured beside PSNR and SSIM, and on what beside the runs.
+void add_measure_flags(CLI::App& command, CLI::Option* datasets, CompareFlags& flags) {
+    command
+        .add_option("--lpips", flags.lpips,
+                    "a safetensors file with the weights of AlexNet or VGG16 or of LPIPS's layers; "
+                    "once for each file")
+        ->allow_extra_args(false);
+    command.add_flag("--flip", flags.flip,
+                     "also measure FLIP, what a viewer sees change between picture and photo");
+    auto* add = command
+                    .add_option("--add", flags.add,
+                                "NAME=FILE: also measure the splats of another program, in any "
+                                "format that darb reads; NAME@DATASET=FILE where there are several "
+                                "data sets; once for each")
+                    ->allow_extra_args(false);
+    command
+        .add_option("--merge", flags.merge,
+                    "instead of comparing, make one report of several compare.json, such as those "
+                    "of several machines")
+        ->excludes(datasets)
+        ->excludes(add);
+    command.add_flag("--lpips-as-3dgs", flags.lpips_as_3dgs,
+                     "feed colours from 0 to 1 into LPIPS, as published figures of splats do");
+}
+
 }  // namespace
 
 void add_compare_flags(CLI::App& command, CompareFlags& flags) {
-    command.add_option(
+    auto* datasets = command.add_option(
         "datasets", flags.datasets,
         "data sets as for darb train; PATH@images_4 names a photo folder for one of them");
     command.add_option("-o,--output", flags.output,
@@ -456,13 +513,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     forward(command, flags, "--strategy", "--strategy", strategy_names());
     command.add_option("--train-options", flags.train_options,
                        "more options of darb train, together in quotes");
-    command
-        .add_option("--lpips", flags.lpips,
-                    "a safetensors file with the weights of AlexNet or VGG16 or of LPIPS's layers; "
-                    "once for each file")
-        ->allow_extra_args(false);
-    command.add_flag("--lpips-as-3dgs", flags.lpips_as_3dgs,
-                     "feed colours from 0 to 1 into LPIPS, as published figures of splats do");
+    add_measure_flags(command, datasets, flags);
     command
         .add_option("--blending-views", flags.blending_views,
                     "views whose blending is counted and timed; 0: none")
@@ -471,6 +522,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     command.add_option("--html", flags.html, "the report's file (default OUT/compare.html)");
     command.add_option("--json", flags.json,
                        "the numbers' file (default OUT/compare.json); - is stdout");
+    add_paper_option(command, flags.paper);
     command.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
     add_quiet_flag(command, flags.quiet);
 }
@@ -486,6 +538,74 @@ std::vector<int> kernels_of(const CompareFlags& flags) {
         throw Error("--pulses", "none of the kernels has so many",
                     "raised_cosine and sinc have 1 to 3 pulses, the others one.");
     return rows;
+}
+
+std::vector<AddedMethod> added_methods(const CompareFlags& flags) {
+    std::vector<AddedMethod> methods;
+    std::set<std::string> taken;
+    for (const std::string& text : flags.add) {
+        const std::string option = "--add " + text;
+        const std::size_t equals = text.find('=');
+        if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+            throw Error(option, "is not NAME=FILE", "Give it as --add 3dgs=point_cloud.ply.");
+        AddedMethod method{text.substr(0, equals), "", text.substr(equals + 1)};
+        if (const std::size_t at = method.name.rfind('@'); at != std::string::npos) {
+            method.dataset = method.name.substr(at + 1);
+            method.name.resize(at);
+        } else if (flags.datasets.size() == 1) {
+            method.dataset = dataset_name(flags.datasets.front());
+        } else {
+            throw Error(option, "does not say to which of the data sets it belongs",
+                        "Name it: --add " + method.name + "@" +
+                            dataset_name(flags.datasets.front()) + "=" + method.file.string() +
+                            ".");
+        }
+        if (std::none_of(flags.datasets.begin(), flags.datasets.end(), [&](const auto& dataset) {
+                return dataset_name(dataset) == method.dataset;
+            }))
+            throw Error(option, "no data set here is called " + method.dataset,
+                        "Name one by the last folder of its path.");
+        if (method.name.empty() || kernel_from_name(method.name))
+            throw Error(option, "a method cannot be called \"" + method.name + "\"",
+                        "Give it a name that is not empty and no kernel's.");
+        if (!taken.insert(method.dataset + "/" + file_name(method.name)).second)
+            throw Error(option, "another method has this name",
+                        "Give them names that differ in letters or digits.");
+        if (!fs::exists(method.file))
+            throw Error(method.file.string(), "no such file or folder", "Check the name.");
+        methods.push_back(std::move(method));
+    }
+    return methods;
+}
+
+int merge_reports(const CompareFlags& flags) {
+    if (flags.output.empty())
+        throw Error("darb compare --merge", "no output folder", "Name one with -o OUT.");
+    if (flags.merge.size() < 2)
+        throw Error("darb compare --merge", "names one report", "Name two or more.");
+    check_paper_folder(flags.paper);
+    const fs::path html = flags.html.empty() ? flags.output / "compare.html" : flags.html;
+    const fs::path json = flags.json.empty() ? flags.output / "compare.json" : flags.json;
+    refuse_to_overwrite_inputs({html, json}, flags.merge);
+    std::vector<Comparison> reports;
+    for (const fs::path& file : flags.merge) reports.push_back(read_comparison(file));
+    MergedComparison merged = merge_comparisons(flags.merge, reports);
+    say_notes(merged.notes);
+    const std::string lines = repeated_lines(merged.repeated);
+    for (RepeatedCell& cell : merged.repeated)
+        for (std::string* file : {&cell.first, &cell.second}) *file = name_in_json(json, *file);
+    Report report = comparison_report(merged.comparison);
+    report.table(repeated_table(merged.repeated), 2);
+    fs::create_directories(flags.output);
+    nlohmann::json numbers = shared_json(merged.comparison, json);
+    numbers["repeated"] = repeated_json(merged.repeated);
+    write_json(json, numbers);
+    write_file_atomic(html, report.page());
+    write_paper(flags.paper, report, flags.merge);
+    tell(stream_beside_json(json, flags.quiet), "{}{}report   {}\n",
+         comparison_table(merged.comparison), lines, html.string());
+    tell_paths(flags.quiet, {json, html, flags.paper});
+    return 0;
 }
 
 std::string dataset_path(const std::string& dataset) {
@@ -563,10 +683,56 @@ void RunMeasurer::on_device(ComparedRun& run, const char* what,
 
 void RunMeasurer::measure(ComparedRun& run) {
     attempt(run, "LPIPS", [&] { lpips_.measure(run); });
+    if (flags_.flip) attempt(run, "FLIP", [&] { measure_flip(run); });
     attempt(run, "learned shapes", [&] { read_shapes_of(run); });
     if (!scaled_.empty() || !off_path_.views.empty())
         on_device(run, "other sizes and views off the path",
                   [&](Device& device) { measure_models(run, device); });
+}
+
+ComparedRun RunMeasurer::measure_added(const AddedMethod& method,
+                                       const std::vector<View>& held_out) {
+    ComparedRun run;
+    run.kernel = method.name;
+    run.trained_here = false;
+    run.folder = flags_.output / method.dataset / "added" / file_name(method.name);
+    const int last = flags_.iterations.back();
+    const std::filesystem::path pictures = run.folder / "held_out" / std::to_string(last);
+    try {
+        const SplatModel model = load_scene(method.file);
+        SceneEvaluation options = options_;
+        std::set<std::string> used;
+        std::vector<std::filesystem::path> files;
+        options.on_picture = [&](const View& view, const ImageF& picture, const ImageU8& photo) {
+            files.push_back(pictures / picture_name(view.name, used));
+            write_png(files.back(), side_by_side(composite(photo, options_.background), picture));
+        };
+        Device device(command_device(flags_.device));
+        settle_tuning(device);
+        const Evaluation measured = evaluate_scene(device, model, held_out, options);
+        ComparedAt at;
+        at.psnr_db = measured.psnr_db;
+        at.ssim = measured.ssim;
+        at.seconds = std::nan("");
+        at.splats = static_cast<double>(model.size());
+        at.model = find_scene(method.file);
+        if (std::filesystem::is_regular_file(at.model))
+            at.model_mb = 1e-6 * static_cast<double>(std::filesystem::file_size(at.model));
+        if (measured.arc) at.arc_db = measured.arc->psnr_db;
+        for (std::size_t v = 0; v < measured.views.size(); ++v)
+            at.views.push_back({measured.views[v].name, measured.views[v].psnr_db,
+                                measured.views[v].ssim, std::nullopt, files[v]});
+        for (const int iteration : flags_.iterations) {
+            run.at.push_back(at);
+            run.at.back().iteration = iteration;
+        }
+    } catch (const std::exception& e) {
+        run.failure = e.what();
+        count_exception(e, run);
+    }
+    if (run.failure.empty()) measure(run);
+    say_what_went_wrong(run);
+    return run;
 }
 
 void RunMeasurer::measure_blending(std::vector<ComparedRun>& runs,

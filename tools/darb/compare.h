@@ -16,9 +16,16 @@
 
 namespace darb {
 
+/// --add NAME=FILE: the splats of another program, to be measured beside the kernels.
+struct AddedMethod {
+    std::string name;
+    std::string dataset;  // the name of the one that it belongs to
+    std::filesystem::path file;
+};
+
 struct CompareFlags {
     std::vector<std::string> datasets;
-    std::filesystem::path output, html, json;
+    std::filesystem::path output, html, json, paper;
     std::string kernels = "paper", device, train_options;
     std::vector<std::filesystem::path> kernel_files;
     std::vector<int> iterations{7'000, 30'000};
@@ -28,7 +35,9 @@ struct CompareFlags {
     std::uint32_t max_splats = 0;        // 0: as many as the threshold makes
     std::vector<std::string> forwarded;  // options of `darb train`, as words
     std::vector<std::filesystem::path> lpips;
-    bool lpips_as_3dgs = false, quiet = false;
+    std::vector<std::string> add;              // NAME=FILE or NAME@DATASET=FILE
+    std::vector<std::filesystem::path> merge;  // reports, instead of data sets
+    bool lpips_as_3dgs = false, flip = false, quiet = false;
     int blending_views = 4;
 };
 
@@ -44,6 +53,13 @@ std::string dataset_path(const std::string& dataset);
 
 /// The last folder of the path as it was given, so that a link keeps its name.
 std::string dataset_name(const std::string& dataset);
+
+/// The methods of --add. Throws Error for a name that is taken or a file that is missing, and where
+/// it is not said to which of several data sets one belongs.
+std::vector<AddedMethod> added_methods(const CompareFlags& flags);
+
+/// darb compare --merge: writes the page and the file of several reports as one.
+int merge_reports(const CompareFlags& flags);
 
 /// The options that `darb train` would have for this run. Throws Error for unknown --train-options.
 TrainRequest train_request_of(const CompareFlags& flags, const std::string& dataset, int kernel,

@@ -31,7 +31,7 @@ namespace darb {
 struct CostFlags {
     std::string scene, dataset, device, train, train_options;
     int seeds = 0, iterations = 0;
-    std::filesystem::path json, html;
+    std::filesystem::path json, html, paper;
     bool quick = false, full = false, quiet = false, white_background = false;
     DatasetOptions data;
     TuneFlags tune;
@@ -75,6 +75,7 @@ CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most)
 int cost(const CostFlags& flags) {
     if (!flags.train.empty())
         return with_ranks([&](Ranks& ranks) { return train_cost(ranks, flags); });
+    check_paper_folder(flags.paper);
     if (flags.scene.empty())
         throw Error("darb cost", "no scene", "Name a PLY file, or a data set with --train.");
     refuse_to_overwrite_inputs({flags.json, flags.html},
@@ -96,11 +97,14 @@ int cost(const CostFlags& flags) {
     json["dataset"] = flags.dataset.empty() ? "" : name_in_json(flags.json, flags.dataset);
     write_json(flags.json, json);
     if (!flags.html.empty())
-        write_file_atomic(flags.html, cost_html(result, name_in_json(flags.html, flags.scene)));
+        write_file_atomic(flags.html,
+                          cost_report(result, name_in_json(flags.html, flags.scene)).page());
+    write_paper(flags.paper, cost_report(result, name_in_json(flags.paper, flags.scene)),
+                together({files_of(flags.scene), files_of(flags.dataset)}));
     tell(stream_beside_json(flags.json, flags.quiet), "{}: {} splats, {}; {} views of {}\n\n{}",
          flags.scene, model.size(), result.device, views.cameras.size(),
          flags.dataset.empty() ? "an orbit" : flags.dataset, cost_table(result));
-    tell_paths(flags.quiet, {flags.json, flags.html});
+    tell_paths(flags.quiet, {flags.json, flags.html, flags.paper});
     return 0;
 }
 
@@ -129,6 +133,7 @@ void add_cost(CLI::App& app, Action& action) {
         ->needs(train);
     add_json_option(*command, flags->json);
     command->add_option("--html", flags->html, "write a page with plots to this file");
+    add_paper_option(*command, flags->paper);
     auto* quick = command->add_flag("--quick", flags->quick,
                                     "take seconds: fewer views, repeats and combinations");
     command->add_flag("--full", flags->full, "take minutes: more of all three")->excludes(quick);
@@ -159,6 +164,7 @@ int train_cost(Ranks& ranks, const CostFlags& flags) {
     if (!flags.scene.empty())
         throw Error("darb cost " + flags.scene + " --train " + flags.train,
                     "--train takes no scene: it trains its own", "Leave the scene out.");
+    check_paper_folder(flags.paper);
     int iterations = flags.quick ? 300 : flags.full ? 7'000 : 1'500;
     if (flags.iterations > 0) iterations = flags.iterations;
     std::vector<std::string> words{flags.train, "-o",       ".",
@@ -194,10 +200,12 @@ int train_cost(Ranks& ranks, const CostFlags& flags) {
     result.dataset = name_in_json(flags.json, flags.train);
     write_json(flags.json, train_cost_json(result));
     result.dataset = name_in_json(flags.html, flags.train);
-    if (!flags.html.empty()) write_file_atomic(flags.html, train_cost_html(result));
+    const Report report = train_cost_report(result);
+    if (!flags.html.empty()) write_file_atomic(flags.html, report.page());
+    write_paper(flags.paper, report, files_of(flags.train));
     tell(stream_beside_json(flags.json, flags.quiet), "{}: iterations {}, seeds {}, {}\n\n{}",
          flags.train, result.iterations, result.seeds, result.device, train_cost_table(result));
-    tell_paths(flags.quiet, {flags.json, flags.html});
+    tell_paths(flags.quiet, {flags.json, flags.html, flags.paper});
     return 0;
 }
 

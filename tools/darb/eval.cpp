@@ -10,6 +10,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/core/error.h"
@@ -57,9 +58,10 @@ nlohmann::json told_light(std::FILE* out, const LightReport& light);
 namespace {
 
 struct EvalFlags {
-    std::filesystem::path scene, dataset, json;
+    std::filesystem::path scene, dataset, json, paper;
     std::string split = "test", device, effects = "auto";
     bool eval_exposure = false, quiet = false, light = false, align = false, white = false;
+    bool flip = false;
     std::vector<double> scales;  // empty: the size of the photos
     StoredUnits units;
     DatasetOptions data;
@@ -78,10 +80,30 @@ std::vector<View> views_of(const Dataset& dataset, const EvalFlags& flags) {
     return views;
 }
 
+void tell_off_path(std::FILE* out, const Evaluation& evaluation, Report& report) {
+    tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
+         evaluation.psnr_db, evaluation.ssim);
+    print_depth(out, evaluation);
+    Table table = evaluation_table(evaluation);
+    table.name = "off path";
+    table.title = "Views off the path";
+    report.table(std::move(table));
+}
+
+/// Tells the evaluation, one or at several sizes, and returns it as JSON.
+template <class Measured>
+nlohmann::json told_evaluation(std::FILE* out, const Measured& measured, Report& report) {
+    print_evaluation(out, measured);
+    report.table(evaluation_table(measured));
+    return evaluation_json(measured);
+}
+
 int eval(Ranks& ranks, EvalFlags flags) {
     refuse_to_overwrite_inputs({flags.json},
                                together({files_of(flags.scene), files_of(flags.dataset)}));
+    check_paper_folder(flags.paper);
     SceneEvaluation options;
+    options.flip = flags.flip;
     options.ranks = &ranks;
     options.accuracy = chosen_accuracy(flags.accuracy);
     hold_out_as_trained(flags.scene, flags.data);
@@ -110,30 +132,27 @@ int eval(Ranks& ranks, EvalFlags flags) {
     Device device(device_options);
     settle_tuning(device);
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
-    nlohmann::json figures;
-    if (flags.scales.empty()) {
-        const Evaluation measured = evaluate_scene(device, model, views, options);
-        figures = evaluation_json(measured);
-        print_evaluation(out, measured);
-    } else {
-        const auto scales = evaluate_scales(device, model, flags.scales, sizes, options);
-        figures = evaluation_json(scales);
-        print_evaluation(out, scales);
-    }
+    Report report("Evaluation", name_in_json(flags.paper, flags.scene) + " on " +
+                                    name_in_json(flags.paper, flags.dataset));
+    nlohmann::json figures =
+        flags.scales.empty()
+            ? told_evaluation(out, evaluate_scene(device, model, views, options), report)
+            : told_evaluation(out, evaluate_scales(device, model, flags.scales, sizes, options),
+                              report);
     if (!away.views.empty()) {
         options.alpha_is_mask = away.alpha_is_mask;
         const Evaluation evaluation = evaluate_scene(device, model, beyond, options);
         figures["off_path"] = evaluation_json(evaluation);
-        tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
-             evaluation.psnr_db, evaluation.ssim);
-        print_depth(out, evaluation);
+        tell_off_path(out, evaluation, report);
     }
     if (!ranks.is_first()) return 0;
     if (flags.light)
         figures["light_of_few_views"] = told_light(
             out, measure_light(device, model, options.effects, dataset.views, views, beyond));
     write_json(flags.json, figures);
-    tell_paths(flags.quiet, {flags.json});
+    write_paper(flags.paper, report,
+                together({files_of(flags.scene), files_of(dataset.views), files_of(away.views)}));
+    tell_paths(flags.quiet, {flags.json, flags.paper});
     return 0;
 }
 
@@ -184,6 +203,9 @@ void add_eval(CLI::App& app, Action& action) {
         ->capture_default_str()
         ->check(CLI::IsMember({"test", "train", "all"}));
     add_json_option(*command, flags->json);
+    add_paper_option(*command, flags->paper);
+    command->add_flag("--flip", flags->flip,
+                      "also measure FLIP, what a viewer sees change between picture and photo");
     command
         ->add_option("-i,--images", flags->data.images_folder, "photo folder of a COLMAP project")
         ->capture_default_str();

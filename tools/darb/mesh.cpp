@@ -45,7 +45,7 @@ constexpr double kWorkingShare = 0.85;  // of --max-memory for a range of blocks
 constexpr double kManyThin = 0.01;      // of the blocks with a surface: worth a note
 
 struct MeshFlags {
-    std::filesystem::path scene, cameras, output, json;
+    std::filesystem::path scene, cameras, output, json, paper;
     std::string method = "tsdf", reading, bounds, max_memory, texture = "vertex", device;
     std::string effects = "auto", collider, capsule, up, align;
     bool force = false, quiet = false;
@@ -65,7 +65,8 @@ struct MeshResult {
     TriangleMesh mesh;
     std::optional<MeshTexture> texture;
     nlohmann::json report;
-    std::string text;  // for people
+    std::string text;      // for people
+    Report paper{"", ""};  // the same as tables, where there is a reference
 };
 
 WorldBox box_from(const std::string& text, const glm::dvec3& origin) {
@@ -212,6 +213,41 @@ std::string comparison_text(const MeshComparison& c) {
         text += "\n";
     }
     return text;
+}
+
+Report comparison_report(const MeshFlags& flags, const MeshComparison& c) {
+    Report report("Mesh and reference", name_in_json(flags.paper, flags.output) + " against " +
+                                            name_in_json(flags.paper, flags.reference.path));
+    using Kind = TableColumn::Kind;
+    const bool both = c.completeness.samples > 0;
+    const auto known = [](double v) { return std::isfinite(v) ? TableCell(v) : TableCell(); };
+    Table table{"distances",
+                "Distances",
+                both ? fmt::format("World units. {:.1f} % left out of the Chamfer distance.",
+                                   100 * c.left_out_share)
+                     : "World units.",
+                {{"", "", Better::neither, 0, Kind::name}},
+                {}};
+    for (const char* name : {"mean", "median", "90 %", "largest", "bias", "Chamfer"})
+        table.columns.push_back({name, "", Better::neither, 5});
+    table.columns.push_back({"normals off by", "degrees", Better::neither, 1});
+    table.rows.push_back(
+        {{"accuracy, mesh to reference", c.accuracy.mean, c.accuracy.median, c.accuracy.p90,
+          c.accuracy.largest, known(c.bias), TableCell(), known(c.normal_degrees)}});
+    if (both)
+        table.rows.push_back(
+            {{"completeness, reference to mesh", c.completeness.mean, c.completeness.median,
+              c.completeness.p90, c.completeness.largest, TableCell(), c.chamfer, TableCell()}});
+    report.table(std::move(table));
+    Table scores{
+        "f scores", "Shares within a distance", "", {{"within", "", Better::neither, 5}}, {}};
+    for (const char* name : {"precision", "recall", "F"})
+        scores.columns.push_back({name, "", Better::neither, 3});
+    for (const FScore& f : c.f_scores)
+        scores.rows.push_back({{f.threshold, f.precision, both ? TableCell(f.recall) : TableCell(),
+                                both ? TableCell(f.f()) : TableCell()}});
+    report.table(std::move(scores));
+    return report;
 }
 
 nlohmann::json alignment_json(const Alignment& a) {
@@ -362,6 +398,7 @@ MeshResult make_surface(const MeshFlags& flags, const MeshProgress& progress) {
         const ReferenceComparison found = compare_with_reference(made, f.reference);
         say_notes(found.notes);
         result.report["comparison"] = comparison_json(found.comparison);
+        result.paper = comparison_report(f, found.comparison);
         if (found.alignment) {
             result.report["alignment"] = alignment_json(*found.alignment);
             result.text += alignment_text(*found.alignment);
@@ -445,6 +482,7 @@ int mesh(const MeshFlags& flags) {
     const WrittenFiles written(files_of(flags.scene), flags.force);
     written.check({flags.output});
     check_output(flags);
+    check_paper_folder(flags.paper);
     const MeshProgress progress = stoppable_progress(stop_on_signals());
     MeshResult result;
     EncodedSplats encoded;
@@ -464,7 +502,9 @@ int mesh(const MeshFlags& flags) {
     written.wrote(outputs);
     write_json(flags.json, result.report);
     tell(stream_beside_json(flags.json, flags.quiet), "{}", result.text);
-    tell_paths(flags.quiet, together({outputs, {flags.json}}));
+    if (!flags.reference.path.empty())
+        write_paper(flags.paper, result.paper, together({inputs, outputs}));
+    tell_paths(flags.quiet, together({outputs, {flags.json, flags.paper}}));
     return 0;
 }
 
@@ -569,6 +609,7 @@ void add_reference_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) 
         ->check(CLI::IsMember({"rigid", "similarity"}))
         ->needs(reference);
     groups.surface.push_back(reference);
+    groups.surface.push_back(add_paper_option(c, flags.paper)->needs(reference));
 }
 
 void add_collider_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {

@@ -284,6 +284,28 @@ CLI::Option* add_json_option(CLI::App& command, std::filesystem::path& json) {
     return command.add_option("--json", json, "write every number to this file; - is stdout");
 }
 
+CLI::Option* add_paper_option(CLI::App& command, std::filesystem::path& folder) {
+    return command.add_option("--paper", folder,
+                              "write the tables into this folder as CSV and LaTeX, and the plots "
+                              "as SVG and PDF; report.tex shows them");
+}
+
+void check_paper_folder(const fs::path& folder) {
+    std::error_code none;
+    if (!folder.empty() && fs::exists(folder, none) && !fs::is_directory(folder, none))
+        throw Error(folder.string(), "is a file, and --paper takes a folder",
+                    "Name another one; it is made where it does not exist.");
+}
+
+void write_paper(const fs::path& folder, const Report& report, const Paths& inputs) {
+    if (folder.empty()) return;
+    check_paper_folder(folder);
+    Paths files;
+    for (const ReportFile& file : report.files()) files.push_back(folder / file.name);
+    refuse_to_overwrite_inputs(files, inputs);
+    write_paper_files(folder, report);
+}
+
 std::FILE* stream_beside_json(const std::filesystem::path& json, bool quiet) {
     return quiet ? nullptr : json == "-" ? stderr : stdout;
 }

@@ -16,6 +16,7 @@
 
 #include "engine/core/say.h"
 #include "engine/data/dataset.h"
+#include "engine/report/report.h"
 #include "engine/scene/splat_file.h"
 
 namespace darb {
@@ -80,6 +81,17 @@ Paths together(std::initializer_list<Paths> lists);
 // and the text for people then goes to stderr.
 
 CLI::Option* add_json_option(CLI::App& command, std::filesystem::path& json);
+
+/// --paper FOLDER, the same in every command that makes a report: its tables as CSV and LaTeX, its
+/// plots as SVG and PDF.
+CLI::Option* add_paper_option(CLI::App& command, std::filesystem::path& folder);
+
+/// Throws Error where the folder is a file; before the work that makes the report.
+void check_paper_folder(const std::filesystem::path& folder);
+
+/// Writes the report's files into the folder; does nothing where that is empty. Throws Error, like
+/// refuse_to_overwrite_inputs().
+void write_paper(const std::filesystem::path& folder, const Report& report, const Paths& inputs);
 
 /// The stream for text for people; null where quiet.
 std::FILE* stream_beside_json(const std::filesystem::path& json, bool quiet);

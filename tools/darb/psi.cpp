@@ -22,12 +22,13 @@ struct PsiFlags {
     std::string kernels = "all";
     PsiGridOptions grid;
     std::vector<std::filesystem::path> kernel_files;
-    std::filesystem::path json, html;
+    std::filesystem::path json, html, paper;
     bool quiet = false;
 };
 
 int psi(const PsiFlags& flags) {
     refuse_to_overwrite_inputs({flags.json, flags.html}, flags.kernel_files);
+    check_paper_folder(flags.paper);
     std::vector<PsiResult> results;
     std::vector<const DerivedKernel*> kernels;
     const std::vector<int> list = kernels_from_list("--kernel", flags.kernels, flags.kernel_files);
@@ -40,11 +41,14 @@ int psi(const PsiFlags& flags) {
     numbers["in_the_shaders"] = fits_json(fits);
     numbers["shapes"] = shapes_json(list);
     write_json(flags.json, numbers);
-    if (!flags.html.empty())
-        write_file_atomic(flags.html, psi_html(results, kernels, fits, flags.grid));
+    if (!flags.html.empty() || !flags.paper.empty()) {
+        const Report report = psi_report(results, kernels, fits, flags.grid);
+        if (!flags.html.empty()) write_file_atomic(flags.html, report.page());
+        write_paper(flags.paper, report, flags.kernel_files);
+    }
     tell(stream_beside_json(flags.json, flags.quiet), "{}{}{}", psi_table(results),
          fits_table(fits), shapes_table(list));
-    tell_paths(flags.quiet, {flags.json, flags.html});
+    tell_paths(flags.quiet, {flags.json, flags.html, flags.paper});
     return 0;
 }
 
@@ -71,6 +75,7 @@ void add_psi(CLI::App& app, Action& action) {
     command->add_option("--seed", flags->grid.seed)->capture_default_str();
     add_json_option(*command, flags->json);
     command->add_option("--html", flags->html, "write a page with plots to this file");
+    add_paper_option(*command, flags->paper);
     add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return psi(*flags); }; });
 }

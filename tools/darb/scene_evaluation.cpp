@@ -28,8 +28,9 @@ namespace darb {
 namespace {
 struct ViewNumbers {  // one view's numbers, on their way from another rank
     double psnr_db, ssim;
-    bool has_depth;
+    bool has_depth, has_flip;
     DepthError depth;
+    double flip;
 };
 
 // Depths need whole pixels, and 16 bits do not hold them.
@@ -95,14 +96,19 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
                 options.alpha_is_mask);
         const ViewMetrics metrics =
             compare_view(view.name, image, photo, options.background, options.alpha_is_mask);
-        own.push_back(
-            {metrics.psnr_db, metrics.ssim, depth.has_value(), depth.value_or(DepthError{})});
+        const double flip =
+            options.flip ? flip_of_view(image, photo, options.background, options.alpha_is_mask)
+                         : 0;
+        if (options.on_picture) options.on_picture(view, image, photo);
+        own.push_back({metrics.psnr_db, metrics.ssim, depth.has_value(), options.flip,
+                       depth.value_or(DepthError{}), flip});
     }
     Evaluation evaluation;
     for (const ViewNumbers& m : by_turns(ranks, own)) {
         const View& view = views[evaluation.views.size()];
         evaluation.views.push_back({view.name, m.psnr_db, m.ssim, view.in_arc});
         if (m.has_depth) evaluation.views.back().depth = m.depth;
+        if (m.has_flip) evaluation.views.back().flip = m.flip;
     }
     take_means(evaluation);
     return evaluation;
@@ -145,10 +151,12 @@ nlohmann::json evaluation_json(const Evaluation& evaluation) {
         views.push_back({{"name", v.name}, {"psnr_db", v.psnr_db}, {"ssim", v.ssim}});
         if (v.in_arc) views.back()["in_arc"] = true;
         if (v.depth) views.back()["depth"] = depth_json(*v.depth);
+        if (v.flip) views.back()["flip"] = *v.flip;
     }
     nlohmann::json json{{"mean", {{"psnr_db", evaluation.psnr_db}, {"ssim", evaluation.ssim}}},
                         {"views", views}};
     if (evaluation.depth) json["mean"]["depth"] = depth_json(*evaluation.depth);
+    if (evaluation.flip) json["mean"]["flip"] = *evaluation.flip;
     if (const auto& arc = evaluation.arc)
         json["arc"] = {{"views", arc->views}, {"psnr_db", arc->psnr_db}, {"ssim", arc->ssim}};
     return json;
@@ -166,32 +174,51 @@ nlohmann::json evaluation_json(const std::vector<AtScale>& scales) {
     return {{"scales", rows}};
 }
 
-void print_evaluation(std::FILE* out, const Evaluation& evaluation) {
+Table evaluation_table(const Evaluation& evaluation) {
+    Table table{"views", "Views", "", {}, {}};
+    table.columns = {{"view", "", Better::neither, 0, TableColumn::Kind::name},
+                     {"PSNR", "dB", Better::more, 3},
+                     {"SSIM", "", Better::more, 4},
+                     {"FLIP", "", Better::less, 4}};
+    for (const ViewMetrics& v : evaluation.views)
+        table.rows.push_back({{printable(v.name), v.psnr_db, v.ssim, v.flip}});
     const size_t in_arc = evaluation.arc ? evaluation.arc->views : 0;
-    const std::string mean = fmt::format("mean of {}", evaluation.views.size() - in_arc);
-    const std::string arc = in_arc > 0 ? fmt::format("arc, mean of {}", in_arc) : "";
-    size_t width = std::max(mean.size(), arc.size());
-    for (const ViewMetrics& v : evaluation.views) width = std::max(width, printable(v.name).size());
-    const auto row = [&](const std::string& name, double psnr_db, double ssim) {
-        tell(out, "{:<{}}  {:>8.3f}  {:>7.4f}\n", name, width, psnr_db, ssim);
-    };
-    tell(out, "{:<{}}  {:>8}  {:>7}\n", "view", width, "PSNR dB", "SSIM");
-    for (const ViewMetrics& v : evaluation.views) row(printable(v.name), v.psnr_db, v.ssim);
-    row(mean, evaluation.psnr_db, evaluation.ssim);
-    if (in_arc > 0) row(arc, evaluation.arc->psnr_db, evaluation.arc->ssim);
+    table.rows.push_back({{fmt::format("mean of {}", evaluation.views.size() - in_arc),
+                           evaluation.psnr_db, evaluation.ssim, evaluation.flip},
+                          false});
+    if (in_arc > 0)
+        table.rows.push_back({{fmt::format("arc, mean of {}", in_arc), evaluation.arc->psnr_db,
+                               evaluation.arc->ssim, TableCell()},
+                              false});
+    return table;
+}
+
+Table evaluation_table(const std::vector<AtScale>& scales) {
+    Table table{"scales", "Sizes", "", {}, {}};
+    table.columns = {{"scale", "", Better::neither, 0, TableColumn::Kind::name},
+                     {"size", "px", Better::neither, 0, TableColumn::Kind::name},
+                     {"PSNR", "dB", Better::more, 3},
+                     {"SSIM", "", Better::more, 4},
+                     {"FLIP", "", Better::less, 4},
+                     {"arc,", "dB", Better::more, 3},
+                     {"SSIM", "", Better::more, 4}};
+    for (const AtScale& at : scales) {
+        const auto& arc = at.evaluation.arc;
+        table.rows.push_back({{scale_text(at.scale), fmt::format("{} x {}", at.width, at.height),
+                               at.evaluation.psnr_db, at.evaluation.ssim, at.evaluation.flip,
+                               arc ? TableCell(arc->psnr_db) : TableCell(),
+                               arc ? TableCell(arc->ssim) : TableCell()}});
+    }
+    return table;
+}
+
+void print_evaluation(std::FILE* out, const Evaluation& evaluation) {
+    tell(out, "{}", text_table(evaluation_table(evaluation)));
     print_depth(out, evaluation);
 }
 
 void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales) {
-    const bool arcs = !scales.empty() && scales.front().evaluation.arc.has_value();
-    tell(out, "{:<8}  {:<11}  {:>8}  {:>7}{}\n", "scale", "size px", "PSNR dB", "SSIM",
-         arcs ? "  arc, dB     SSIM" : "");
-    for (const AtScale& at : scales) {
-        const auto& arc = at.evaluation.arc;
-        tell(out, "{:<8}  {:<11}  {:>8.3f}  {:>7.4f}{}\n", scale_text(at.scale),
-             fmt::format("{} x {}", at.width, at.height), at.evaluation.psnr_db, at.evaluation.ssim,
-             arc ? fmt::format("  {:>7.3f}  {:>7.4f}", arc->psnr_db, arc->ssim) : "");
-    }
+    tell(out, "{}", text_table(evaluation_table(scales)));
 }
 
 void take_trained_cameras(const std::filesystem::path& scene, std::vector<View>& views) {

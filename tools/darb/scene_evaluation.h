@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <nlohmann/json_fwd.hpp>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "engine/plan/accuracy.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/ranks/ranks.h"
+#include "engine/report/table.h"
 #include "engine/scene/splat_model.h"
 #include "trainer/run/run.h"
 
@@ -27,6 +29,9 @@ struct SceneEvaluation {
     bool alpha_is_mask = false;  // as in the data set
     // as in the data set; measured depths are compared where views have them
     double depth_scale = 1;
+    bool flip = false;  // also measure FLIP
+    /// Gets each picture of this process with its photo, in any order of the views.
+    std::function<void(const View&, const ImageF& picture, const ImageU8& photo)> on_picture = {};
     Ranks* ranks = nullptr;  // ranks that share the views; null: only this process
 };
 
@@ -57,6 +62,11 @@ void print_evaluation(std::FILE* out, const Evaluation& evaluation);
 void print_depth(std::FILE* out, const Evaluation& evaluation);
 /// Prints a line for each scale: the means over its views.
 void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales);
+
+/// A row for each view, and their means.
+Table evaluation_table(const Evaluation& evaluation);
+/// A row for each scale: the means over its views.
+Table evaluation_table(const std::vector<AtScale>& scales);
 
 // The cameras with which a run ended, where it refined them.
 

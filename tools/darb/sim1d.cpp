@@ -24,7 +24,7 @@ struct Sim1dFlags {
     bool quiet = false;
     Study1dOptions study;
     std::vector<std::filesystem::path> kernel_files;
-    std::filesystem::path json, html;
+    std::filesystem::path json, html, paper;
 };
 
 std::vector<int> signals_from_list(const std::string& list) {
@@ -58,6 +58,7 @@ std::vector<int> kernels_1d_from_list(const std::string& list,
 
 int sim1d(Sim1dFlags flags) {
     refuse_to_overwrite_inputs({flags.json, flags.html}, flags.kernel_files);
+    check_paper_folder(flags.paper);
     flags.study.kernels = kernels_1d_from_list(flags.kernels, flags.kernel_files);
     flags.study.signals = signals_from_list(flags.signals);
     const bool shown = !flags.quiet && is_terminal(stderr);
@@ -66,9 +67,13 @@ int sim1d(Sim1dFlags flags) {
             say_text(fmt::format("\r{} of {} runs{}", done, all, done == all ? "\n" : ""));
     });
     write_json(flags.json, study_1d_json(result));
-    if (!flags.html.empty()) write_file_atomic(flags.html, study_1d_html(result));
+    if (!flags.html.empty() || !flags.paper.empty()) {
+        const Report report = study_1d_report(result);
+        if (!flags.html.empty()) write_file_atomic(flags.html, report.page());
+        write_paper(flags.paper, report, flags.kernel_files);
+    }
     tell(stream_beside_json(flags.json, flags.quiet), "{}", study_1d_table(result));
-    tell_paths(flags.quiet, {flags.json, flags.html});
+    tell_paths(flags.quiet, {flags.json, flags.html, flags.paper});
     return 0;
 }
 
@@ -112,6 +117,7 @@ void add_sim1d(CLI::App& app, Action& action) {
         ->check(zero_or_more());
     add_json_option(*command, flags->json);
     command->add_option("--html", flags->html, "write a page with plots to this file");
+    add_paper_option(*command, flags->paper);
     add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return sim1d(*flags); }; });
 }

@@ -10,7 +10,8 @@
 #include "engine/data/image_io.h"
 #include "engine/kernels/kernel_family.h"
 #include "engine/report/html.h"
-#include "engine/report/svg_plot.h"
+#include "tools/paper/compare_merge.h"
+#include "tools/paper/compare_pictures.h"
 #include "tools/paper/compare_runs.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
@@ -31,7 +32,8 @@ Json at_json(const ComparedAt& at) {
         views.push_back({{"name", v.name},
                          {"psnr_db", v.psnr_db},
                          {"ssim", v.ssim},
-                         {"lpips", optional_json(v.lpips)}});
+                         {"lpips", optional_json(v.lpips)},
+                         {"flip", optional_json(v.flip)}});
     Json scales = Json::array();
     for (const ComparedScale& s : at.scales)
         scales.push_back({{"scale", s.scale}, {"psnr_db", s.psnr_db}, {"ssim", s.ssim}});
@@ -40,6 +42,7 @@ Json at_json(const ComparedAt& at) {
             {"psnr_db", at.psnr_db},
             {"ssim", at.ssim},
             {"lpips", optional_json(at.lpips)},
+            {"flip", optional_json(at.flip)},
             {"splats", at.splats},
             {"model_mb", optional_json(at.model_mb)},
             {"views", views},
@@ -50,9 +53,10 @@ Json at_json(const ComparedAt& at) {
 
 Json run_json(const ComparedRun& run) {
     Json json{
-        {"kernel", run.kernel},   {"seed", run.seed},      {"folder", run.folder.string()},
-        {"failure", run.failure}, {"notes", run.notes},    {"peak_mb", optional_json(run.peak_mb)},
-        {"at", Json::array()},    {"curve", Json::array()}};
+        {"kernel", run.kernel},  {"trained_here", run.trained_here},      {"machine", run.machine},
+        {"seed", run.seed},      {"folder", run.folder.string()},         {"failure", run.failure},
+        {"notes", run.notes},    {"peak_mb", optional_json(run.peak_mb)}, {"at", Json::array()},
+        {"curve", Json::array()}};
     for (const ComparedAt& at : run.at) json["at"].push_back(at_json(at));
     for (const CurvePoint& p : run.curve)
         json["curve"].push_back({{"iteration", p.iteration},
@@ -77,6 +81,8 @@ Json summary_json(const Comparison& c, const ComparedDataset& dataset) {
             for (const Column& column : every_column(c)) {
                 const OverSeeds v = over_seeds(dataset, kernel, iteration, column);
                 row[column.json] = v.median ? Json{{"median", *v.median},
+                                                   {"mean", *v.mean},
+                                                   {"deviation", optional_json(v.deviation)},
                                                    {"low", v.low},
                                                    {"high", v.high},
                                                    {"runs", v.count}}
@@ -102,55 +108,15 @@ Json paper_json(const std::string& dataset) {
 
 }  // namespace
 
-namespace {
-
-// One line per kernel, with a star where it is the best; with several seeds, the range below it.
-std::string kernel_lines(const Comparison& c, const ComparedDataset& dataset, int iteration,
-                         const std::vector<Column>& columns) {
-    std::vector<std::vector<OverSeeds>> values(columns.size());
-    std::vector<Marks> marks;
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-        for (const std::string& kernel : c.kernels)
-            values[k].push_back(over_seeds(dataset, kernel, iteration, columns[k]));
-        marks.push_back(marks_over_seeds(values[k], columns[k]));
-    }
-    std::string text;
-    for (std::size_t row = 0; row < c.kernels.size(); ++row) {
-        std::string line = fmt::format("{:<26}", c.kernels[row]);
-        std::string ranges = fmt::format("{:<26}", "  lowest to highest");
-        bool several = false;
-        for (std::size_t k = 0; k < columns.size(); ++k) {
-            const OverSeeds& v = values[k][row];
-            const auto number = [&](double value) {
-                return format_number(value, columns[k].decimals);
-            };
-            line += fmt::format(
-                " {:>12}",
-                v.median ? number(*v.median) + (marks[k][row] == Mark::best ? "*" : "") : "-");
-            const bool range = v.count > 1;
-            several |= range;
-            ranges += fmt::format(" {:>12}", range ? number(v.low) + "-" + number(v.high) : "");
-        }
-        text += line + "\n" + (several ? ranges + "\n" : "");
-    }
-    return text;
-}
-
-}  // namespace
-
 std::string comparison_table(const Comparison& c) {
     std::string text;
-    const std::vector<Column> columns = shown_columns(c);
     for (const ComparedDataset& dataset : c.datasets)
         for (const int iteration : c.iterations) {
-            text += fmt::format("{}, {} iterations\n{:<26}", dataset.name, format_number(iteration),
-                                "");
-            for (const Column& column : columns)
-                text += fmt::format(
-                    " {:>12}", column.unit.empty() ? column.name : column.name + " " + column.unit);
-            text += "\n";
-            text += kernel_lines(c, dataset, iteration, columns) + "\n";
+            const Table table = methods_table(c, dataset, iteration, every_column(c));
+            text += table.title + "\n" + text_table(table) + "\n";
         }
+    for (const Table& table : paired_tables(c))
+        text += table.title + "\n" + text_table(table) + "\n";
     for (const ComparedDataset& dataset : c.datasets) text += pulse_lines(c, dataset);
     for (const ComparedDataset& dataset : c.datasets)
         for (const ComparedRun& run : dataset.runs)
@@ -166,6 +132,9 @@ nlohmann::json comparison_json(const Comparison& c) {
     for (const ComparedDataset& dataset : c.datasets) {
         Json one{{"name", dataset.name},
                  {"path", dataset.path.string()},
+                 {"fingerprint", dataset.fingerprint},
+                 {"width", dataset.width},
+                 {"height", dataset.height},
                  {"medians", summary_json(c, dataset)},
                  {"runs", Json::array()},
                  {"pulses", pulse_json(c, dataset)},
@@ -173,9 +142,17 @@ nlohmann::json comparison_json(const Comparison& c) {
         for (const ComparedRun& run : dataset.runs) one["runs"].push_back(run_json(run));
         datasets.push_back(std::move(one));
     }
-    return {{"version", DARB_VERSION}, {"device", c.device},    {"settings", c.settings},
-            {"seeds", c.seeds},        {"lpips", c.lpips_note}, {"iterations", c.iterations},
-            {"kernels", c.kernels},    {"datasets", datasets},  {"means", means_json(c)}};
+    Json machines = Json::array();
+    for (const Machine& machine : c.machines)
+        machines.push_back({{"device", machine.device}, {"driver", machine.driver}});
+    return {{"format", "darb-compare"},   {"format_version", kCompareFormatVersion},
+            {"version", DARB_VERSION},    {"machines", machines},
+            {"device", c.device},         {"settings", c.settings},
+            {"seeds", c.seeds},           {"lpips", c.lpips_note},
+            {"iterations", c.iterations}, {"kernels", c.kernels},
+            {"added", c.added},           {"scales", c.scales},
+            {"datasets", datasets},       {"means", means_json(c)},
+            {"paired", paired_json(c)}};
 }
 
 // The page of `darb compare`: per data set the paper's tables, the curves, the paper's own figures,
@@ -185,116 +162,95 @@ namespace {
 
 constexpr int kSplatPicture = 110;    // px
 constexpr double kSplatExtent = 4.2;  // standard deviations; times the pulses
-constexpr int kCropWidth = 200;       // px on the page
-
-std::string marked(const std::string& text, std::size_t row, const Marks& marks) {
-    if (marks[row] == Mark::best) return "<b>" + text + "</b>";
-    if (marks[row] == Mark::third) return "<u>" + text + "</u>";
-    return text;
-}
-
-std::string head_of(const std::string& first, const std::vector<Column>& columns) {
-    std::string html = "<div class='wide'><table><tr><th>" + first + "</th>";
-    for (const Column& c : columns)
-        html += fmt::format("<th>{}{}</th>", c.name, c.unit.empty() ? "" : " (" + c.unit + ")");
-    return html + "</tr>\n";
-}
-
-std::string table_of(const Comparison& c, const ComparedDataset& dataset, int iteration,
-                     const std::vector<Column>& columns) {
-    std::vector<Marks> marks;
-    std::vector<std::vector<OverSeeds>> values(columns.size());
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-        for (const std::string& kernel : c.kernels)
-            values[k].push_back(over_seeds(dataset, kernel, iteration, columns[k]));
-        marks.push_back(marks_over_seeds(values[k], columns[k]));
-    }
-    std::string html = head_of("kernel", columns);
-    for (std::size_t row = 0; row < c.kernels.size(); ++row) {
-        html += "<tr><td>" + html_escape(c.kernels[row]) + "</td>";
-        for (std::size_t k = 0; k < columns.size(); ++k)
-            html += "<td>" +
-                    marked(spread_text(values[k][row], columns[k].decimals), row, marks[k]) +
-                    "</td>";
-        html += "</tr>\n";
-    }
-    return html + "</table></div>\n";
-}
-
-std::string means_row(const std::string& name, const std::vector<Column>& columns,
-                      const std::vector<std::vector<std::optional<double>>>& values,
-                      std::size_t row, const std::vector<Marks>* marks) {
-    std::string html = "<tr><td>" + html_escape(name) + "</td>";
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-        const auto& value = values[k][row];
-        const std::string text = value ? format_number(*value, columns[k].decimals) : "-";
-        html += "<td>" + (marks == nullptr ? text : marked(text, row, (*marks)[k])) + "</td>";
-    }
-    return html + "</tr>\n";
-}
 
 /// The means of one group of data sets; the last row tells how many data sets each column covers.
-std::string means_table(const Comparison& c, const Means& means,
-                        const std::vector<Column>& columns) {
-    std::vector<Marks> marks;
-    for (std::size_t k = 0; k < columns.size(); ++k)
-        marks.push_back(marks_of(means.values[k], columns[k]));
-    std::string html = head_of("kernel", columns);
+Table means_table(const Comparison& c, int iteration, const Means& means,
+                  const std::vector<Column>& columns) {
+    std::string names;
+    for (const std::string& name : means.names) names += (names.empty() ? "" : ", ") + name;
+    const std::string group = means.benchmark.empty() ? "all data sets" : means.benchmark;
+    Table table{
+        fmt::format("means {} {}", group, iteration),
+        fmt::format("Means, {}, {} iterations", group, format_number(iteration)),
+        fmt::format("{}. Each over the data sets where every kernel has the value; the last "
+                    "row says how many.{}",
+                    names, means.benchmark.empty() ? "" : " The paper's are over the same scenes."),
+        {{"kernel", "", Better::neither, 0, TableColumn::Kind::name}},
+        {},
+        Contest::down};
+    for (const Column& column : columns)
+        table.columns.push_back({column.name, column.unit,
+                                 column.more_is_better ? Better::more : Better::less,
+                                 column.decimals});
+    const auto add = [&](const std::string& name,
+                         const std::vector<std::vector<std::optional<double>>>& values,
+                         std::size_t row, bool ranked) {
+        TableRow& added = table.rows.emplace_back();
+        added.cells.emplace_back(name);
+        added.ranked = ranked;
+        for (std::size_t k = 0; k < columns.size(); ++k) added.cells.emplace_back(values[k][row]);
+    };
     for (std::size_t row = 0; row < c.kernels.size(); ++row) {
-        html += means_row(c.kernels[row], columns, means.values, row, &marks);
+        add(method_text(c, c.kernels[row]), means.values, row, true);
         if (std::any_of(means.paper.begin(), means.paper.end(),
                         [&](const auto& values) { return values[row].has_value(); }))
-            html += means_row(c.kernels[row] + ", the paper", columns, means.paper, row, nullptr);
+            add(c.kernels[row] + ", the paper", means.paper, row, false);
     }
-    html += "<tr><td>data sets</td>";
-    for (const int covered : means.covered) html += fmt::format("<td>{}</td>", covered);
-    return html + "</tr>\n</table></div>\n";
+    TableRow& last = table.rows.emplace_back();
+    last.ranked = false;
+    last.cells.emplace_back("data sets");
+    for (const int covered : means.covered)
+        last.cells.push_back(covered > 0 ? TableCell(fmt::format("{}", covered)) : TableCell());
+    return table;
 }
 
-std::string means_part(const Comparison& c, int iteration) {
-    const std::vector<Column> columns = shown_columns(c);
-    std::string html;
-    for (const Means& means : means_of(c, iteration, columns)) {
-        std::string names;
-        for (const std::string& name : means.names) names += (names.empty() ? "" : ", ") + name;
-        html += fmt::format(
-                    "<h2>Means, {}, {} iterations</h2><p class='soft'>{}. Each over the data sets "
-                    "where every kernel has the value; the last row says how many. {}</p>",
-                    means.benchmark.empty() ? "all data sets" : means.benchmark,
-                    format_number(iteration), html_escape(names),
-                    means.benchmark.empty() ? "" : "The paper's are over the same scenes.") +
-                means_table(c, means, columns);
-    }
-    return html;
-}
+using Points = std::vector<std::pair<double, double>>;
 
-const ComparedRun* first_run(const Comparison& c, const ComparedDataset& dataset,
-                             std::size_t kernel) {
-    for (const ComparedRun& run : dataset.runs)
-        if (run.kernel == c.kernels[kernel] && run.failure.empty()) return &run;
-    return nullptr;
-}
-
-/// One curve per kernel, from the first seed.
-template <class Points>
-std::string plot(const Comparison& c, const ComparedDataset& dataset, Plot frame, bool dots,
-                 const Points& points) {
-    for (std::size_t k = 0; k < c.kernels.size(); ++k) {
-        PlotSeries series;
-        series.dots = dots;
-        if (const ComparedRun* run = first_run(c, dataset, k)) {
-            series.points = points(*run);
-            series.dots |= series.points.size() == 1;  // a line of one point is not seen
-            for (const auto& [x, y] : series.points)
-                series.titles.push_back(fmt::format("{}: {:.5g}, {:.5g}", c.kernels[k], x, y));
+/// The points of all runs of a method, averaged point by point as far as all of them go, with a
+/// standard deviation to both sides as a band, or the range of two runs.
+PlotSeries mean_curve(const std::string& method, const std::vector<Points>& runs, bool dots) {
+    PlotSeries series{method};
+    series.dots = dots;
+    std::size_t length = runs.empty() ? 0 : runs.front().size();
+    for (const Points& points : runs) length = std::min(length, points.size());
+    const double count = static_cast<double>(runs.size());
+    for (std::size_t i = 0; i < length; ++i) {
+        double x = 0, y = 0, squares = 0, low = 1e300, high = -1e300;
+        for (const Points& points : runs) {
+            x += points[i].first / count;
+            y += points[i].second / count;
+            low = std::min(low, points[i].second);
+            high = std::max(high, points[i].second);
         }
-        frame.series.push_back(std::move(series));
+        for (const Points& points : runs)
+            squares += (points[i].second - y) * (points[i].second - y);
+        series.points.emplace_back(x, y);
+        series.titles.push_back(fmt::format("{}: {:.5g}, {:.5g}", method, x, y));
+        if (runs.size() < 2) continue;
+        const double deviation = std::sqrt(squares / (count - 1));
+        series.band.push_back(runs.size() == 2 ? std::pair{low, high}
+                                               : std::pair{y - deviation, y + deviation});
     }
-    return svg_plot(frame);
+    series.dots |= length == 1;  // a line of one point is not seen
+    return series;
 }
 
-std::string curves(const Comparison& c, const ComparedDataset& dataset) {
-    using Points = std::vector<std::pair<double, double>>;
+/// One curve for each method, over its seeds.
+template <class Of>
+Figure plot(const Comparison& c, const ComparedDataset& dataset, Plot frame, bool dots,
+            const Of& points) {
+    frame.legend_beside = true;
+    for (const std::string& method : c.kernels) {
+        std::vector<Points> runs;
+        for (const ComparedRun& run : dataset.runs)
+            if (run.kernel == method && run.failure.empty() && run.trained_here)
+                runs.push_back(points(run));
+        frame.series.push_back(mean_curve(method, runs, dots));
+    }
+    return {fmt::format("{} {} {}", dataset.name, frame.title, frame.x_label), frame};
+}
+
+void add_curves(const Comparison& c, const ComparedDataset& dataset, Report& report) {
     const auto of_curve = [](auto x, auto y) {
         return [x, y](const ComparedRun& run) {
             Points points;
@@ -320,79 +276,56 @@ std::string curves(const Comparison& c, const ComparedDataset& dataset) {
             return points;
         };
     };
-    std::string html;
-    html += plot(c, dataset, {"Loss", "iterations", "loss", {}, true}, false,
-                 of_curve(&CurvePoint::iteration, &CurvePoint::loss));
-    html += plot(c, dataset, {"Loss", "training time (s)", "loss", {}, true}, false,
-                 of_curve(&CurvePoint::seconds, &CurvePoint::loss));
-    html += plot(c, dataset, {"Speed", "iterations", "iterations a second", {}, false, true}, false,
-                 speed(&CurvePoint::iteration));
-    html += plot(c, dataset, {"Speed", "training time (s)", "iterations a second", {}, false, true},
-                 false, speed(&CurvePoint::seconds));
-    html += plot(c, dataset, {"Splats", "iterations", "splats", {}, false, true}, false,
-                 of_curve(&CurvePoint::iteration, &CurvePoint::splats));
-    html += plot(c, dataset, {"Held-out PSNR", "training time (s)", "PSNR (dB)", {}}, true,
-                 of_at(&ComparedAt::psnr_db));
-    return html_legend(c.kernels) + "<div class='plots'>" + html + "</div>\n";
+    std::vector<Figure> figures;
+    const auto add = [&](Plot frame, bool dots, const auto& points) {
+        figures.push_back(plot(c, dataset, std::move(frame), dots, points));
+    };
+    add({"Loss", "iterations", "loss", {}, true}, false,
+        of_curve(&CurvePoint::iteration, &CurvePoint::loss));
+    add({"Loss", "training time (s)", "loss", {}, true}, false,
+        of_curve(&CurvePoint::seconds, &CurvePoint::loss));
+    add({"Speed", "iterations", "iterations a second", {}, false, true}, false,
+        speed(&CurvePoint::iteration));
+    add({"Speed", "training time (s)", "iterations a second", {}, false, true}, false,
+        speed(&CurvePoint::seconds));
+    add({"Splats", "iterations", "splats", {}, false, true}, false,
+        of_curve(&CurvePoint::iteration, &CurvePoint::splats));
+    add({"Held-out PSNR", "training time (s)", "PSNR (dB)", {}}, true, of_at(&ComparedAt::psnr_db));
+    report.plots(std::move(figures), c.kernels);
 }
 
-std::string paper_table(const ComparedDataset& dataset) {
-    const std::vector<PaperNumbers> rows = paper_numbers_of(dataset.name);
-    if (rows.empty()) return {};
-    std::string html =
-        "<h3>What the paper prints for this scene</h3><div class='wide'><table><tr><th>kernel</th>"
-        "<th>iterations</th><th>PSNR (dB)</th><th>SSIM</th><th>LPIPS</th><th>model (MB)</th>"
-        "<th>training (s)</th></tr>\n";
-    for (const PaperNumbers& p : rows)
-        html += fmt::format(
-            "<tr><td>{}</td><td>{}</td><td>{:.2f}</td><td>{:.4f}</td><td>{:.4f}</td><td>{:.0f}</td>"
-            "<td>{:.0f}</td></tr>\n",
-            kernel_name(p.kernel), format_number(p.iteration), p.psnr_db, p.ssim, p.lpips,
-            p.model_mb, p.training_s);
-    return html + "</table></div><p class='soft'>One RTX 4090, single runs, its own code.</p>\n";
-}
-
-std::string crop_rows(const Comparison& c, const ComparedDataset& dataset) {
-    const ComparedRun* base = nullptr;
-    for (std::size_t k = 0; k < c.kernels.size(); ++k)
-        if (const ComparedRun* run = first_run(c, dataset, k);
-            run != nullptr && (base == nullptr || run->kernel == kernel_name(KERNEL_GAUSSIAN)))
-            base = run;
-    if (base == nullptr || base->at.empty()) return {};
-    std::string html;
-    for (std::size_t k = 0; k < c.kernels.size(); ++k) {
-        const ComparedRun* run = first_run(c, dataset, k);
-        if (run == nullptr || run == base || run->at.empty()) continue;
-        for (const Crop& crop : crops_of(base->at.back(), run->at.back())) {
-            const std::string gain =
-                fmt::format("{}: {}", run->kernel, format_number(-1e3 * crop.gain, 2));
-            html +=
-                html_pictures({{crop.photo, fmt::format("{} at {}, {}", crop.view, crop.x, crop.y)},
-                               {crop.first, base->kernel},
-                               {crop.second, gain}},
-                              kCropWidth);
-        }
-    }
-    return html.empty()
-               ? ""
-               : fmt::format(
-                     "<h3>Where the errors differ most</h3><p class='soft'>Photo, {0}, kernel: "
-                     "first where the kernel gains most on {0}, then where it loses most; the "
-                     "number is its squared error less that of {0}, times 1,000.</p>",
-                     html_escape(base->kernel)) +
-                     html;
+Table paper_table(const ComparedDataset& dataset) {
+    Table table{"paper " + dataset.name,
+                "What the paper prints for this scene",
+                "One RTX 4090, single runs, its own code.",
+                {{"kernel", "", Better::neither, 0, TableColumn::Kind::name},
+                 {"iterations", "", Better::neither, 0},
+                 {"PSNR", "dB"},
+                 {"SSIM", "", Better::neither, 4},
+                 {"LPIPS", "", Better::neither, 4},
+                 {"model", "MB", Better::neither, 0},
+                 {"training", "s", Better::neither, 0}},
+                {}};
+    for (const PaperNumbers& p : paper_numbers_of(dataset.name))
+        table.rows.push_back({{std::string(kernel_name(p.kernel)), double(p.iteration), p.psnr_db,
+                               p.ssim, p.lpips, p.model_mb, p.training_s}});
+    return table;
 }
 
 /// The paper's Figure 2: how one covariance looks with each kernel.
-std::string splat_figure(const Comparison& c) {
+void add_splat_figure(const Comparison& c, Report& report) {
     std::vector<Captioned> pictures;
     Plot profile{"Splats of one covariance", "distance (standard deviations)", "weight", {}};
+    profile.legend_beside = true;
     std::vector<std::string> names;
     int pulses = 1;
     for (const std::string& name : c.kernels)
-        pulses = std::max(pulses, kernel_pulses(kernel_from_name(name).value()));
+        if (const std::optional<int> kernel = kernel_from_name(name)) {
+            names.push_back(name);
+            pulses = std::max(pulses, kernel_pulses(*kernel));
+        }
     const double extent = kSplatExtent * pulses;
-    for (const std::string& name : c.kernels) {
+    for (const std::string& name : names) {
         const int k = kernel_from_name(name).value();
         const double scale = covariance_scale(k, Footprint::psi);
         const auto w = [&](double q) { return kernel_value(k, Footprint::psi, q / scale); };
@@ -403,141 +336,69 @@ std::string splat_figure(const Comparison& c) {
             return w(a * a / 2 + b * b * 2);
         };
         pictures.push_back({grey_field(kSplatPicture, 1, at), name});
-        PlotSeries series;
+        PlotSeries series{name};
         for (int i = 0; i <= 200 * pulses; ++i)
             series.points.emplace_back(0.022 * i, w(0.022 * i * 0.022 * i));
         profile.series.push_back(std::move(series));
-        names.push_back(name);
     }
-    return "<h2>One covariance, every kernel</h2><p class='soft'>The paper's Figure 2: splats of "
-           "the same 3D covariance, psi included.</p>" +
-           html_pictures(pictures, 150) + html_legend(names) + "<div class='plots'>" +
-           svg_plot(profile) + "</div>\n";
+    if (names.empty()) return;
+    report.heading("One covariance, every kernel");
+    report.html(
+        "<p class='soft'>The paper's Figure 2: splats of the same 3D covariance, psi "
+        "included.</p>" +
+        html_pictures(pictures, 150));
+    report.plots({{"", profile}}, names);
 }
 
-std::string dataset_part(const Comparison& c, const ComparedDataset& dataset) {
-    std::string html = "<h2>" + html_escape(dataset.name) + "</h2>\n";
+void add_dataset(const Comparison& c, const ComparedDataset& dataset, Report& report) {
+    report.heading(dataset.name);
     for (const int iteration : c.iterations)
-        html += fmt::format("<h3>{} iterations</h3>", format_number(iteration)) +
-                table_of(c, dataset, iteration, shown_columns(c));
-    html += paper_table(dataset) + pulse_html(c, dataset) + curves(c, dataset);
+        report.table(methods_table(c, dataset, iteration, every_column(c)));
+    report.table(paper_table(dataset));
+    report.table(pulse_table(c, dataset));
+    add_curves(c, dataset, report);
     if (std::any_of(dataset.runs.begin(), dataset.runs.end(),
-                    [](const ComparedRun& run) { return run.blending.has_value(); }))
-        html += "<h3>What blending takes</h3>" +
-                table_of(c, dataset, c.iterations.back(), blending_columns());
+                    [](const ComparedRun& run) { return run.blending.has_value(); })) {
+        Table table = methods_table(c, dataset, c.iterations.back(), blending_columns());
+        table.title = "What blending takes, " + table.title;
+        table.caption.clear();
+        report.table(std::move(table));
+    }
     for (const ComparedRun& run : dataset.runs)
         for (const auto& [what, why] : {std::pair{"Failed", run.failure}, {"Note", run.notes}})
             if (!why.empty())
-                html += fmt::format("<p>{}: {}, seed {}: {}</p>\n", what, html_escape(run.kernel),
-                                    run.seed, html_escape(why));
-    return html + crop_rows(c, dataset);
+                report.html(fmt::format("<p>{}: {}, seed {}: {}</p>\n", what,
+                                        html_escape(run.kernel), run.seed, html_escape(why)));
+    add_pictures(c, dataset, report);
 }
 
 }  // namespace
 
-std::string comparison_html(const Comparison& c) {
-    std::string body;
-    for (const int iteration : c.iterations) body += means_part(c, iteration);
-    body += shapes_html(c);
-    for (const ComparedDataset& dataset : c.datasets) body += dataset_part(c, dataset);
-    body += splat_figure(c);
-    body += fmt::format(
-        "<h2>How to read it</h2><p>Bold: best; underlined: third best, of the medians of a column "
-        "as they are printed; all that tie are marked. With several seeds only what no other "
-        "kernel's range overlaps is bold. "
-        "Held-out views. Medians over {} seed{}, range in brackets; curves and crops are of the "
-        "first. {}</p><p>{}</p><p>Model: the PLY file. Peak: device memory, over the whole run, "
+Report comparison_report(const Comparison& c) {
+    Report report("Kernels compared", c.device);
+    for (const int iteration : c.iterations) {
+        const std::vector<Column> columns = every_column(c);
+        for (const Means& means : means_of(c, iteration, columns))
+            report.table(means_table(c, iteration, means, columns), 2);
+        for (Table& table : tables_by_dataset(c, iteration)) report.table(std::move(table));
+    }
+    for (Table& table : paired_tables(c)) report.table(std::move(table), 2);
+    add_shapes(c, report);
+    for (const ComparedDataset& dataset : c.datasets) add_dataset(c, dataset, report);
+    add_splat_figure(c, report);
+    report.html(fmt::format(
+        "<h2>How to read it</h2><p>Bold: best; underlined: second best of three or more, as they "
+        "are printed; all that tie are marked. With several seeds only what no other "
+        "kernel's range overlaps is bold, and none is underlined. "
+        "Held-out views. {} seed{}: with two, means and ranges in brackets; with more, means and "
+        "standard deviations, which are the bands of the curves; crops are of the first. "
+        "{}</p><p>{}</p><p>Model: the PLY file. Peak: device memory, over the whole run, "
         "whatever the iteration. Training: without evaluation. Splats blended per pixel are those "
         "with alpha at or over the cut-off before "
         "the pixel is opaque, counted in double precision; ns per splat and pixel is the time of "
         "the blend pass over them.</p>\n",
-        c.seeds, c.seeds == 1 ? "" : "s", html_escape(c.settings), html_escape(c.lpips_note));
-    return html_page("Kernels compared", c.device, body);
-}
-
-namespace {
-
-constexpr int kLeastSide = 24;  // px
-
-/// Sums over rectangles in constant time.
-class SumTable {
-  public:
-    SumTable(int width, int height)
-        : width_(width), sums_(static_cast<std::size_t>(width + 1) * (height + 1), 0.0) {}
-    void set(int x, int y, double v) {
-        sums_[at(x + 1, y + 1)] = v + sums_[at(x, y + 1)] + sums_[at(x + 1, y)] - sums_[at(x, y)];
-    }
-    double square(int x, int y, int side) const {
-        return sums_[at(x + side, y + side)] - sums_[at(x, y + side)] - sums_[at(x + side, y)] +
-               sums_[at(x, y)];
-    }
-
-  private:
-    std::size_t at(int x, int y) const { return static_cast<std::size_t>(y) * (width_ + 1) + x; }
-    int width_;
-    std::vector<double> sums_;
-};
-
-double squared_error(const ImageU8& a, const ImageU8& b, int x, int y) {
-    double sum = 0;
-    for (int c = 0; c < 3; ++c) {
-        const double d = (double(a.at(x, y, c)) - b.at(x, y, c)) / 255;
-        sum += d * d / 3;
-    }
-    return sum;
-}
-
-ImageU8 cut(const ImageU8& image, const Crop& crop) {
-    ImageU8 part(crop.side, crop.side, 3);
-    for (int y = 0; y < crop.side; ++y)
-        for (int x = 0; x < crop.side; ++x)
-            for (int c = 0; c < 3; ++c) part.at(x, y, c) = image.at(crop.x + x, crop.y + y, c);
-    return part;
-}
-
-void take(std::optional<Crop>& best, bool better, const Crop& place, const HeldOutPicture& a,
-          const HeldOutPicture& b) {
-    if (best && !better) return;
-    best = place;
-    best->photo = cut(a.photo, place);
-    best->first = cut(a.render, place);
-    best->second = cut(b.render, place);
-}
-
-}  // namespace
-
-std::vector<Crop> crops_of(const ComparedAt& first, const ComparedAt& second) {
-    std::optional<Crop> gain, loss;
-    for (const ComparedView& view : first.views) {
-        const auto other = std::find_if(second.views.begin(), second.views.end(),
-                                        [&](const ComparedView& v) { return v.name == view.name; });
-        if (other == second.views.end() || !std::filesystem::exists(view.picture) ||
-            !std::filesystem::exists(other->picture))
-            continue;
-        const HeldOutPicture a = read_held_out(view.picture), b = read_held_out(other->picture);
-        const int width = a.photo.width, height = a.photo.height;
-        const int shorter = std::min(width, height);
-        const int side = std::min(shorter, std::max(shorter / 4, kLeastSide));
-        if (b.photo.width != width || b.photo.height != height) continue;
-        SumTable table(width, height);
-        for (int y = 0; y < height; ++y)
-            for (int x = 0; x < width; ++x)
-                table.set(x, y,
-                          squared_error(a.render, a.photo, x, y) -
-                              squared_error(b.render, b.photo, x, y));
-        Crop most{view.name, 0, 0, side, -1e30, {}, {}, {}}, least = most;
-        least.gain = 1e30;
-        for (int y = 0; y + side <= height; ++y)
-            for (int x = 0; x + side <= width; ++x) {
-                const double mean = table.square(x, y, side) / (double(side) * side);
-                if (mean > most.gain) most.x = x, most.y = y, most.gain = mean;
-                if (mean < least.gain) least.x = x, least.y = y, least.gain = mean;
-            }
-        take(gain, gain && most.gain > gain->gain, most, a, b);
-        take(loss, loss && least.gain < loss->gain, least, a, b);
-    }
-    if (!gain) return {};
-    return {std::move(*gain), std::move(*loss)};
+        c.seeds, c.seeds == 1 ? "" : "s", html_escape(c.settings), html_escape(c.lpips_note)));
+    return report;
 }
 
 }  // namespace darb
@@ -557,16 +418,16 @@ struct adl_serializer<std::optional<T>> {
 
 namespace darb {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedView, name, psnr_db, ssim, lpips, picture)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedView, name, psnr_db, ssim, lpips, flip, picture)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedScale, scale, psnr_db, ssim)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedAt, iteration, seconds, psnr_db, ssim, lpips, splats,
-                                   model_mb, model, views, scales, arc_db, off_path_db)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedAt, iteration, seconds, psnr_db, ssim, lpips, flip,
+                                   splats, model_mb, model, views, scales, arc_db, off_path_db)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CurvePoint, iteration, seconds, loss, splats)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LearnedShapes, edges, shares, percentiles)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(BlendStatistics, blended_per_pixel, intersections_per_splat,
                                    blend_ms, frame_ms, ns_per_splat_pixel)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedRun, kernel, seed, folder, failure, notes, exit_code, at,
-                                   curve, peak_mb, blending, shapes)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ComparedRun, kernel, trained_here, machine, seed, folder,
+                                   failure, notes, exit_code, at, curve, peak_mb, blending, shapes)
 
 Bytes bytes_of_runs(const std::vector<ComparedRun>& runs) {
     const std::vector<std::uint8_t> cbor = nlohmann::json::to_cbor(runs);
@@ -592,44 +453,6 @@ std::vector<ComparedRun> runs_of_all(Ranks& ranks, const std::vector<ComparedRun
         runs.push_back(std::move(its[at]));
     }
     return runs;
-}
-
-namespace {
-
-std::uint8_t byte(double v) {
-    return static_cast<std::uint8_t>(std::clamp(v, 0.0, 1.0) * 255 + 0.5);
-}
-
-}  // namespace
-
-ImageU8 grey_field(int size, double white, const std::function<double(int, int)>& value) {
-    ImageU8 image(size, size, 1);
-    for (int y = 0; y < size; ++y)
-        for (int x = 0; x < size; ++x) image.at(x, y, 0) = byte(value(x, y) / white);
-    return image;
-}
-
-ImageU8 signed_field(int size, double limit, const std::function<double(int, int)>& value) {
-    ImageU8 image(size, size, 3);
-    for (int y = 0; y < size; ++y)
-        for (int x = 0; x < size; ++x) {
-            const double v = limit > 0 ? value(x, y) / limit : 0;
-            image.at(x, y, 0) = byte(1 + std::min(v, 0.0));
-            image.at(x, y, 1) = byte(1 - std::abs(v));
-            image.at(x, y, 2) = byte(1 - std::max(v, 0.0));
-        }
-    return image;
-}
-
-std::string html_pictures(const std::vector<Captioned>& pictures, int width_px) {
-    std::string html = "<div style='display:flex;flex-wrap:wrap;gap:.8rem'>";
-    for (const Captioned& one : pictures)
-        html += fmt::format(
-            "<figure style='margin:0;width:{0}px'><img alt='{1}' style='width:100%;"
-            "image-rendering:pixelated;border-radius:4px' src='data:image/png;base64,{2}'/>"
-            "<figcaption style='overflow-wrap:anywhere'>{1}</figcaption></figure>",
-            width_px, html_escape(one.caption), base64(encode_png(one.picture)));
-    return html + "</div>\n";
 }
 
 }  // namespace darb

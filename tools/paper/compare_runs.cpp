@@ -11,6 +11,7 @@
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
 #include "engine/core/quantile.h"
+#include "engine/data/flip.h"
 #include "engine/data/image_io.h"
 #include "engine/data/metrics.h"
 #include "engine/data/run_events.h"
@@ -245,6 +246,22 @@ void ViewLpips::measure(ComparedRun& run) {
         }
         if (measured > 0 && measured == at.views.size())
             at.lpips = sum / static_cast<double>(measured);
+    }
+}
+
+void measure_flip(ComparedRun& run) {
+    for (ComparedAt& at : run.at) {
+        double sum = 0;
+        std::size_t measured = 0;
+        for (ComparedView& view : at.views) {
+            if (!std::filesystem::exists(view.picture)) continue;
+            const HeldOutPicture p = read_held_out(view.picture);
+            view.flip = flip(to_float(p.render), to_float(p.photo));
+            sum += *view.flip;
+            ++measured;
+        }
+        if (measured > 0 && measured == at.views.size())
+            at.flip = sum / static_cast<double>(measured);
     }
 }
 

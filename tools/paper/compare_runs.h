@@ -15,6 +15,7 @@
 #include "engine/core/image.h"
 #include "engine/data/hold_out.h"
 #include "engine/gpu/device.h"
+#include "engine/report/report.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/splat_model.h"
 #include "tools/paper/lpips.h"
@@ -39,6 +40,7 @@ struct ComparedView {
     double psnr_db = 0, ssim = 0;
     std::optional<double> lpips;
     std::filesystem::path picture;  // photo | render | error, equal widths
+    std::optional<double> flip = {};
 };
 
 struct ComparedScale {  // pictures of another size than that of training
@@ -50,7 +52,7 @@ struct ComparedAt {  // an evaluation of one run
     int iteration = 0;
     double seconds = 0;  // training time so far
     double psnr_db = 0, ssim = 0;
-    std::optional<double> lpips;
+    std::optional<double> lpips, flip;
     double splats = 0;
     std::optional<double> model_mb;  // size of its PLY file, 10^6 bytes; empty where it was not
                                      // saved
@@ -77,7 +79,9 @@ struct LearnedShapes {
 };
 
 struct ComparedRun {
-    std::string kernel;  // its name
+    std::string kernel;  // its name, or that of a method that was not trained here
+    bool trained_here = true;
+    std::string machine;  // its device, in a merged comparison; else empty
     std::uint64_t seed = 0;
     std::filesystem::path folder;
     std::string failure;         // why it ended; empty where it finished
@@ -94,17 +98,26 @@ struct ComparedDataset {
     std::string name;
     std::filesystem::path path;
     std::vector<ComparedRun> runs;  // by seed, then kernel
+    std::string fingerprint = {};   // of photos, cameras and held-out views
+    int width = 0, height = 0;      // of the first photo as it was used, px
+};
+
+struct Machine {
+    std::string device, driver;
+    bool operator==(const Machine&) const = default;
 };
 
 struct Comparison {
     std::vector<ComparedDataset> datasets;
     std::vector<std::string> kernels;  // names, in the order of the tables
+    std::vector<std::string> added;    // those of them that were not trained here
     std::vector<int> iterations;       // ascending
     std::vector<double> scales;        // at which pictures were measured, besides that of training
     int seeds = 1;
-    std::string settings;    // what the user asked for, as text
-    std::string device;      // name and driver
-    std::string lpips_note;  // which LPIPS, or why there is none
+    std::string settings;           // what the user asked for, as text
+    std::vector<Machine> machines;  // one, or in a merged comparison several
+    std::string device;             // all of them with their drivers, as text
+    std::string lpips_note;         // which LPIPS, or why there is none
 };
 
 enum class RunState { none, partial, finished };
@@ -134,8 +147,8 @@ HeldOutPicture read_held_out(const std::filesystem::path& picture);
 
 std::string comparison_table(const Comparison& comparison);
 nlohmann::json comparison_json(const Comparison& comparison);
-/// A whole page without external resources. Reads the held-out pictures of the first seed.
-std::string comparison_html(const Comparison& comparison);
+/// Reads the held-out pictures of the first seed.
+Report comparison_report(const Comparison& comparison);
 
 // What a comparison measures on finished runs: LPIPS of held-out pictures, and blending.
 
@@ -157,6 +170,9 @@ class ViewLpips {
     std::size_t room_;                             // bytes left
     std::map<std::string, LpipsFeatures> photos_;  // by view
 };
+
+/// Fills flip of every view with a picture on disk, and the mean where every view has one.
+void measure_flip(ComparedRun& run);
 
 /// Sets run.exit_code as main would for the exception: 2 for what the user can mend, else 1; a 1
 /// stays.

@@ -10,7 +10,6 @@
 #include "engine/kernels/kernel_family.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/report/html.h"
-#include "engine/report/svg_plot.h"
 #include "engine/scene/splat_file.h"
 #include "shaders/shared/limits.h"
 #include "tools/paper/paper_numbers.h"
@@ -38,6 +37,8 @@ const std::vector<Column>& quality_columns() {
          [](const ComparedRun&, const ComparedAt& at) { return Value(at.ssim); }},
         {"LPIPS", "", "lpips", 4, false,
          [](const ComparedRun&, const ComparedAt& at) { return at.lpips; }},
+        {"FLIP", "", "flip", 4, false,
+         [](const ComparedRun&, const ComparedAt& at) { return at.flip; }},
         {"model", "MB", "model_mb", 2, false,
          [](const ComparedRun&, const ComparedAt& at) { return at.model_mb; }},
         {"splats", "", "splats", 0, false,
@@ -45,7 +46,9 @@ const std::vector<Column>& quality_columns() {
         {"peak", "MB", "peak_mb", 0, false,
          [](const ComparedRun& run, const ComparedAt&) { return run.peak_mb; }},
         {"training", "s", "training_s", 1, false,
-         [](const ComparedRun&, const ComparedAt& at) { return Value(at.seconds); }},
+         [](const ComparedRun& run, const ComparedAt& at) {
+             return run.trained_here ? Value(at.seconds) : Value();
+         }},
     };
     return columns;
 }
@@ -76,23 +79,6 @@ std::vector<Column> every_column(const Comparison& comparison) {
     return columns;
 }
 
-std::vector<Column> shown_columns(const Comparison& comparison) {
-    bool lpips = false, arc = false, off_path = false;
-    for (const ComparedDataset& dataset : comparison.datasets)
-        for (const ComparedRun& run : dataset.runs)
-            for (const ComparedAt& at : run.at) {
-                lpips |= at.lpips.has_value();
-                arc |= at.arc_db.has_value();
-                off_path |= at.off_path_db.has_value();
-            }
-    std::vector<Column> columns;
-    for (const Column& column : every_column(comparison))
-        if ((lpips || column.json != "lpips") && (arc || column.json != "arc_psnr_db") &&
-            (off_path || column.json != "off_path_psnr_db"))
-            columns.push_back(column);
-    return columns;
-}
-
 const std::vector<Column>& blending_columns() {
     static const std::vector<Column> columns{
         {"blended per pixel", "splats", "blended_per_pixel", 2, false,
@@ -119,54 +105,224 @@ OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, 
     }
     if (values.empty()) return {};
     std::sort(values.begin(), values.end());
-    return {quantile(values, 0.5), values.front(), values.back(), static_cast<int>(values.size())};
+    const int count = static_cast<int>(values.size());
+    OverSeeds over{quantile(values, 0.5), 0.0, {}, values.front(), values.back(), count};
+    for (const double v : values) *over.mean += v / count;
+    if (count < 3) return over;
+    double squares = 0;
+    for (const double v : values) squares += (v - *over.mean) * (v - *over.mean);
+    over.deviation = std::sqrt(squares / (count - 1));
+    return over;
 }
 
-Marks marks_of(const std::vector<Value>& values, const Column& column) {
-    const double unit = std::pow(10, column.decimals);
-    const auto printed = [&](const Value& v) {
-        return std::round(*v * unit) * (column.more_is_better ? 1 : -1);
+TableCell OverSeeds::cell() const {
+    TableCell cell(mean);
+    if (count < 2) return cell;
+    cell.deviation = deviation;
+    cell.span = {low, high};
+    cell.runs = count;
+    return cell;
+}
+
+std::string method_text(const Comparison& c, const std::string& method) {
+    const bool added = std::find(c.added.begin(), c.added.end(), method) != c.added.end();
+    return added ? method + " (not trained here)" : method;
+}
+
+namespace {
+
+TableColumn table_column(const Column& column) {
+    return {column.name, column.unit, column.more_is_better ? Better::more : Better::less,
+            column.decimals};
+}
+
+std::string seeds_text(const Comparison& c) {
+    if (c.seeds < 2) return "";
+    if (c.seeds == 2) return " Means and range of 2 seeds.";
+    return fmt::format(" Mean and standard deviation over {} seeds.", c.seeds);
+}
+
+/// PSNR, SSIM, LPIPS and FLIP.
+std::vector<Column> picture_columns() {
+    std::vector<Column> columns;
+    for (const Column& column : quality_columns())
+        for (const char* name : {"psnr_db", "ssim", "lpips", "flip"})
+            if (column.json == name) columns.push_back(column);
+    return columns;
+}
+
+}  // namespace
+
+Table methods_table(const Comparison& c, const ComparedDataset& dataset, int iteration,
+                    const std::vector<Column>& columns) {
+    Table table;
+    table.name = fmt::format("{} {} {}", columns.front().json == "psnr_db" ? "quality" : "blending",
+                             dataset.name, iteration);
+    table.title = fmt::format("{}, {} iterations", dataset.name, format_number(iteration));
+    table.caption = "Held-out views." + seeds_text(c);
+    table.columns = {{"kernel", "", Better::neither, 0, TableColumn::Kind::name}};
+    for (const Column& column : columns) table.columns.push_back(table_column(column));
+    for (const std::string& method : c.kernels) {
+        TableRow& row = table.rows.emplace_back();
+        row.cells.emplace_back(method_text(c, method));
+        for (const Column& column : columns)
+            row.cells.push_back(over_seeds(dataset, method, iteration, column).cell());
+    }
+    table.contest = Contest::down;
+    return table;
+}
+
+std::vector<Table> tables_by_dataset(const Comparison& c, int iteration) {
+    std::vector<Table> tables;
+    if (c.datasets.size() < 2) return tables;
+    for (const Column& column : picture_columns()) {
+        Table table{
+            fmt::format("{} by data set {}", column.name, iteration),
+            fmt::format("{}, {} iterations", table_column(column).name, format_number(iteration)),
+            (column.more_is_better ? "More is better." : "Less is better.") + seeds_text(c),
+            {{"data set", "", Better::neither, 0, TableColumn::Kind::name}},
+            {},
+            Contest::across};
+        TableRow mean;
+        mean.cells.emplace_back("mean");
+        bool any = false;
+        for (const std::string& method : c.kernels) {
+            TableColumn one = table_column(column);
+            one.name = method_text(c, method);
+            table.columns.push_back(one);
+        }
+        std::vector<double> sums(c.kernels.size(), 0.0);
+        int covered = 0;
+        for (const ComparedDataset& dataset : c.datasets) {
+            TableRow& row = table.rows.emplace_back();
+            row.cells.emplace_back(dataset.name);
+            bool whole = true;
+            for (const std::string& method : c.kernels) {
+                row.cells.push_back(over_seeds(dataset, method, iteration, column).cell());
+                whole &= row.cells.back().value.has_value();
+                any |= row.cells.back().value.has_value();
+            }
+            covered += whole ? 1 : 0;
+            for (std::size_t k = 0; whole && k < sums.size(); ++k)
+                sums[k] += *row.cells[k + 1].value;
+        }
+        for (const double sum : sums)
+            mean.cells.push_back(covered > 0 ? TableCell(sum / covered) : TableCell());
+        if (covered > 0) table.rows.push_back(std::move(mean));
+        if (covered > 0 && covered < static_cast<int>(c.datasets.size()))
+            table.caption += " The mean is over the data sets where every method has the value.";
+        if (any) tables.push_back(std::move(table));
+    }
+    return tables;
+}
+
+double student_t_95(int freedom) {
+    // The probability within +-t, in closed form for whole degrees of freedom (Abramowitz and
+    // Stegun 26.7.3 and 26.7.4), and t by bisection.
+    const auto within = [&](double t) {
+        const double angle = std::atan(t / std::sqrt(double(freedom)));
+        const double cosine = std::cos(angle), sine = std::sin(angle);
+        const bool odd = freedom % 2 == 1;
+        double term = odd ? cosine : 1, sum = freedom == 1 ? 0 : term;
+        for (int k = odd ? 3 : 2; k <= freedom - 2; k += 2) {
+            term *= cosine * cosine * (k - 1) / k;
+            sum += term;
+        }
+        return odd ? 2 / std::acos(-1.0) * (angle + sine * sum) : sine * sum;
     };
-    Marks marks(values.size(), Mark::none);
-    bool differ = false;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        int better = 0;
-        for (const Value& other : values)
-            if (values[i] && other && printed(other) > printed(values[i])) ++better;
-        differ |= better > 0;
-        if (values[i] && better == 0) marks[i] = Mark::best;
-        if (values[i] && better == 2) marks[i] = Mark::third;
+    double low = 0, high = 100;
+    for (int i = 0; i < 100; ++i) {
+        const double middle = (low + high) / 2;
+        (within(middle) < 0.95 ? low : high) = middle;
     }
-    return differ ? marks : Marks(values.size(), Mark::none);
+    return high;
 }
 
-Marks marks_over_seeds(const std::vector<OverSeeds>& values, const Column& column) {
-    std::vector<Value> medians;
-    bool ranges = false;
-    for (const OverSeeds& value : values) {
-        medians.push_back(value.median);
-        ranges |= value.count > 1;
-    }
-    Marks marks = marks_of(medians, column);
-    if (!ranges) return marks;
-    const auto overlap = [](const OverSeeds& a, const OverSeeds& b) {
-        return a.low <= b.high && b.low <= a.high;
+std::string base_method(const Comparison& c) {
+    const std::string gaussian(kernel_name(KERNEL_GAUSSIAN));
+    if (std::find(c.kernels.begin(), c.kernels.end(), gaussian) != c.kernels.end()) return gaussian;
+    return c.kernels.empty() ? "" : c.kernels.front();
+}
+
+std::optional<PairedDifference> paired_difference(const ComparedDataset& dataset,
+                                                  const std::string& base, const std::string& other,
+                                                  int iteration, const Column& column) {
+    const auto value = [&](const std::string& method, std::uint64_t seed) {
+        for (const ComparedRun& run : dataset.runs)
+            for (const ComparedAt& at : run.at)
+                if (run.kernel == method && run.seed == seed && at.iteration == iteration)
+                    if (const Value v = column.value(run, at); v && std::isfinite(*v)) return v;
+        return Value();
     };
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        bool apart = true;
-        for (std::size_t j = 0; j < values.size(); ++j)
-            if (j != i && values[j].median && overlap(values[i], values[j])) apart = false;
-        if (marks[i] == Mark::third || !apart) marks[i] = Mark::none;
+    std::vector<double> differences;
+    for (const ComparedRun& run : dataset.runs) {
+        if (run.kernel != base) continue;
+        const Value first = value(base, run.seed), second = value(other, run.seed);
+        if (first && second) differences.push_back(*second - *first);
     }
-    return marks;
+    const int count = static_cast<int>(differences.size());
+    if (count < 3) return {};
+    PairedDifference found{0, 0, 0, count};
+    for (const double d : differences) found.mean += d / count;
+    double squares = 0;
+    for (const double d : differences) squares += (d - found.mean) * (d - found.mean);
+    const double half = student_t_95(count - 1) * std::sqrt(squares / (count - 1) / count);
+    found.low = found.mean - half;
+    found.high = found.mean + half;
+    return found;
 }
 
-std::string spread_text(const OverSeeds& value, int decimals) {
-    if (!value.median) return "-";
-    const std::string median = format_number(*value.median, decimals);
-    if (value.count < 2) return median;
-    return fmt::format("{} ({} to {})", median, format_number(value.low, decimals),
-                       format_number(value.high, decimals));
+std::vector<Table> paired_tables(const Comparison& c) {
+    std::vector<Table> tables;
+    const std::string base = base_method(c);
+    if (c.iterations.empty()) return tables;
+    const int iteration = c.iterations.back();
+    using Kind = TableColumn::Kind;
+    for (const Column& column : picture_columns()) {
+        Table table{fmt::format("{} against {}", column.name, base),
+                    fmt::format("{} less that of {}, {} iterations", column.name, base,
+                                format_number(iteration)),
+                    "Differences of runs with equal seeds, their mean and its 95 % interval by "
+                    "Student's t. Clear: 0 is outside of the interval.",
+                    {{"data set", "", Better::neither, 0, Kind::name},
+                     {"kernel", "", Better::neither, 0, Kind::name},
+                     {"difference", column.unit, Better::neither, column.decimals + 1},
+                     {"95 % interval", column.unit, Better::neither, column.decimals + 1},
+                     {"seeds", "", Better::neither, 0},
+                     {"clear", "", Better::neither, 0, Kind::name}},
+                    {}};
+        for (const ComparedDataset& dataset : c.datasets)
+            for (const std::string& method : c.kernels)
+                if (method != base)
+                    if (const auto d = paired_difference(dataset, base, method, iteration, column))
+                        table.rows.push_back(
+                            {{dataset.name, method, d->mean, TableCell::between(d->low, d->high),
+                              double(d->seeds), d->clear() ? "yes" : "no"}});
+        if (!table.rows.empty()) tables.push_back(std::move(table));
+    }
+    return tables;
+}
+
+nlohmann::json paired_json(const Comparison& c) {
+    nlohmann::json rows = nlohmann::json::array();
+    const std::string base = base_method(c);
+    for (const int iteration : c.iterations)
+        for (const ComparedDataset& dataset : c.datasets)
+            for (const std::string& method : c.kernels)
+                for (const Column& column : picture_columns())
+                    if (method != base)
+                        if (const auto d =
+                                paired_difference(dataset, base, method, iteration, column))
+                            rows.push_back({{"data_set", dataset.name},
+                                            {"iteration", iteration},
+                                            {"kernel", method},
+                                            {"base", base},
+                                            {"value", column.json},
+                                            {"mean_difference", d->mean},
+                                            {"low_95", d->low},
+                                            {"high_95", d->high},
+                                            {"seeds", d->seeds}});
+    return rows;
 }
 
 namespace {
@@ -204,7 +360,7 @@ Means means_over(const Comparison& c, int iteration, const std::vector<Column>& 
         for (const ComparedDataset* set : sets) {
             std::vector<Value> values;
             for (const std::string& kernel : c.kernels)
-                values.push_back(over_seeds(*set, kernel, iteration, column).median);
+                values.push_back(over_seeds(*set, kernel, iteration, column).mean);
             if (std::count(values.begin(), values.end(), std::nullopt) > 0) continue;
             for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += *values[i];
             ++covered;
@@ -293,7 +449,9 @@ std::vector<PulseChange> pulse_changes(const Comparison& comparison, const Compa
     std::vector<PulseChange> changes;
     const std::vector<std::string>& names = comparison.kernels;
     for (const std::string& name : names) {
-        const int row = kernel_from_name(name).value();
+        const std::optional<int> known = kernel_from_name(name);
+        if (!known) continue;  // a method that was not trained here
+        const int row = *known;
         const std::string one(kernel_name(kernel_with_pulses(row, 1).value()));
         if (name == one || std::find(names.begin(), names.end(), one) == names.end()) continue;
         const auto both = [&](std::string_view column, auto change) {
@@ -325,25 +483,31 @@ std::string pulse_lines(const Comparison& comparison, const ComparedDataset& dat
     return text;
 }
 
-std::string pulse_html(const Comparison& comparison, const ComparedDataset& dataset) {
-    std::string rows;
+Table pulse_table(const Comparison& comparison, const ComparedDataset& dataset) {
+    Table table{fmt::format("pulses {}", dataset.name),
+                "More pulses against one",
+                "The paper: less memory and less quality. Memory is that of the model.",
+                {{"kernel", "", Better::neither, 0, TableColumn::Kind::name},
+                 {"pulses", "", Better::neither, 0},
+                 {"iterations", "", Better::neither, 0},
+                 {"PSNR", "dB"},
+                 {"SSIM"},
+                 {"splats"},
+                 {"model"},
+                 {"peak"},
+                 {"training"},
+                 {"less memory"},
+                 {"less PSNR"},
+                 {"less SSIM"}},
+                {}};
     for (const int iteration : comparison.iterations)
         for (const PulseChange& c : pulse_changes(comparison, dataset, iteration))
-            rows += fmt::format(
-                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
-                "<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                html_escape(c.kernel), c.pulses, format_number(iteration),
-                difference_text(c.psnr_db, 2), difference_text(c.ssim, 4), ratio_text(c.splats),
-                ratio_text(c.model), ratio_text(c.peak), ratio_text(c.seconds),
-                yes(c.model, c.less_memory()), yes(c.psnr_db, c.less_psnr()),
-                yes(c.ssim, c.less_ssim()));
-    if (rows.empty()) return {};
-    return "<h3>More pulses against one</h3><p class='soft'>The paper: less memory and less "
-           "quality. Memory is that of the model.</p><div class='wide'><table>"
-           "<tr><th>kernel</th><th>pulses</th><th>iterations</th><th>PSNR (dB)</th><th>SSIM</th>"
-           "<th>splats</th><th>model</th><th>peak</th><th>training</th><th>less memory</th>"
-           "<th>less PSNR</th><th>less SSIM</th></tr>\n" +
-           rows + "</table></div>\n";
+            table.rows.push_back(
+                {{c.kernel, double(c.pulses), double(iteration), difference_text(c.psnr_db, 2),
+                  difference_text(c.ssim, 4), ratio_text(c.splats), ratio_text(c.model),
+                  ratio_text(c.peak), ratio_text(c.seconds), yes(c.model, c.less_memory()),
+                  yes(c.psnr_db, c.less_psnr()), yes(c.ssim, c.less_ssim())}});
+    return table;
 }
 
 nlohmann::json pulse_json(const Comparison& comparison, const ComparedDataset& dataset) {
@@ -394,22 +558,22 @@ const ComparedRun* first_with_shapes(const ComparedDataset& dataset, const std::
     return nullptr;
 }
 
-std::string table_of(const Comparison& c, const std::string& kernel) {
-    std::string rows;
+Table shapes_table(const Comparison& c, const std::string& kernel) {
+    Table table{"shapes " + kernel, kernel, "Percentiles of what splats learned.", {}, {}};
+    table.columns = {{"data set", "", Better::neither, 0, TableColumn::Kind::name}};
+    for (const int p : LearnedShapes::kPercentiles)
+        table.columns.push_back({fmt::format("{} %", p)});
     for (const ComparedDataset& dataset : c.datasets)
         if (const ComparedRun* run = first_with_shapes(dataset, kernel)) {
-            rows += "<tr><td>" + html_escape(dataset.name) + "</td>";
+            TableRow& row = table.rows.emplace_back();
+            row.cells.emplace_back(dataset.name);
             for (const double value : run->shapes->percentiles)
-                rows += fmt::format("<td>{:.3g}</td>", value);
-            rows += "</tr>\n";
+                row.cells.emplace_back(fmt::format("{:.3g}", value));
         }
-    std::string head;
-    for (const int p : LearnedShapes::kPercentiles) head += fmt::format("<th>{} %</th>", p);
-    return "<div class='wide'><table><tr><th>" + html_escape(kernel) + "</th>" + head + "</tr>\n" +
-           rows + "</table></div>\n";
+    return table;
 }
 
-std::string plot_of(const Comparison& c, const std::string& kernel) {
+Figure plot_of(const Comparison& c, const std::string& kernel) {
     Plot plot{"Learned by " + kernel, "exponent", "splats (%)", {}};
     plot.from_zero = true;
     for (const ComparedDataset& dataset : c.datasets) {
@@ -426,7 +590,7 @@ std::string plot_of(const Comparison& c, const std::string& kernel) {
         }
         plot.series.push_back(std::move(series));
     }
-    return svg_plot(plot);
+    return {"", plot};
 }
 
 }  // namespace
@@ -460,21 +624,23 @@ void read_shapes_of(ComparedRun& run) {
         run.shapes = learned_shapes(load_splats(run.at.back().model));
 }
 
-std::string shapes_html(const Comparison& c) {
-    std::string plots, tables;
+void add_shapes(const Comparison& c, Report& report) {
+    std::vector<Figure> figures;
+    std::vector<Table> tables;
     for (const std::string& kernel : c.kernels)
         if (std::any_of(c.datasets.begin(), c.datasets.end(), [&](const ComparedDataset& dataset) {
                 return first_with_shapes(dataset, kernel) != nullptr;
             })) {
-            plots += plot_of(c, kernel);
-            tables += table_of(c, kernel);
+            figures.push_back(plot_of(c, kernel));
+            tables.push_back(shapes_table(c, kernel));
         }
-    if (plots.empty()) return {};
-    return "<h2>One kernel, or many?</h2><p class='soft'>The shapes that splats learned, of those "
-           "that are drawn, first seed that is there. Where a curve is narrow, one kernel would "
-           "do. The tables "
-           "have percentiles.</p><div class='plots'>" +
-           plots + "</div>\n" + tables;
+    if (figures.empty()) return;
+    report.heading("One kernel, or many?");
+    report.html(
+        "<p class='soft'>The shapes that splats learned, of those that are drawn, first "
+        "seed that is there. Where a curve is narrow, one kernel would do.</p>");
+    report.plots(std::move(figures));
+    for (Table& table : tables) report.table(std::move(table));
 }
 
 nlohmann::json shapes_json(const LearnedShapes& shapes) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Medians over the seeds of a comparison, and which kernel is best.
+// Means, medians and differences over the seeds of a comparison, and its tables.
 #pragma once
 
 #include <functional>
@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/report/report.h"
 #include "engine/scene/splat_model.h"
 #include "tools/paper/compare_runs.h"
 
@@ -17,9 +18,13 @@ namespace darb {
 std::string scale_text(double scale);
 
 struct OverSeeds {
-    std::optional<double> median;  // empty where no run has the value
+    std::optional<double> median, mean;  // empty where no run has the value
+    std::optional<double> deviation;     // standard deviation, from three runs on
     double low = 0, high = 0;
     int count = 0;
+
+    /// The mean with its deviation, or with the range of two runs.
+    TableCell cell() const;
 };
 
 /// A column of the tables.
@@ -31,12 +36,10 @@ struct Column {
     bool more_is_better = true;
     std::function<std::optional<double>(const ComparedRun&, const ComparedAt&)> value;
 };
-/// PSNR, SSIM, LPIPS, model MB, splats, peak MB, seconds.
+/// PSNR, SSIM, LPIPS, FLIP, model MB, splats, peak MB, seconds.
 const std::vector<Column>& quality_columns();
 /// Those and, after the first, PSNR at each of the comparison's scales and off the path.
 std::vector<Column> every_column(const Comparison& comparison);
-/// The columns that a table shows: without LPIPS and views off the path where no run has them.
-std::vector<Column> shown_columns(const Comparison& comparison);
 /// splats blended per pixel, intersections per splat, ns per splat-pixel, blend ms, frame ms.
 const std::vector<Column>& blending_columns();
 
@@ -44,19 +47,37 @@ const std::vector<Column>& blending_columns();
 OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, int iteration,
                      const Column& column);
 
-/// best: no value is better; third: two are. Values are compared as printed, so that those which
-/// look equal get equal marks.
-enum class Mark { none, best, third };
-using Marks = std::vector<Mark>;
-/// One mark per value; none at all where there is only one value, or all are equal.
-Marks marks_of(const std::vector<std::optional<double>>& values, const Column& column);
+/// A method as tables name it; those that were not trained here say so.
+std::string method_text(const Comparison& comparison, const std::string& method);
 
-/// Marks over several seeds: best is a value whose range, lowest to highest, no other overlaps.
-/// There is no third where seeds have a range.
-Marks marks_over_seeds(const std::vector<OverSeeds>& values, const Column& column);
+/// A row for each method and a column for each of `columns`, the best marked.
+Table methods_table(const Comparison& comparison, const ComparedDataset& dataset, int iteration,
+                    const std::vector<Column>& columns);
 
-/// "27.31" or, over several seeds, "27.31 (27.10 to 27.44)"; "-" without a value.
-std::string spread_text(const OverSeeds& value, int decimals);
+/// For PSNR, SSIM, LPIPS and FLIP a table with a row for each data set and a column for each
+/// method, and their means where every method has the value. None where there is one data set.
+std::vector<Table> tables_by_dataset(const Comparison& comparison, int iteration);
+
+/// The differences of two methods in what their runs with equal seeds give.
+struct PairedDifference {
+    double mean = 0;           // of the other less the base
+    double low = 0, high = 0;  // 95 % interval of the mean, by Student's t
+    int seeds = 0;
+
+    bool clear() const { return low > 0 || high < 0; }
+};
+/// Nothing with fewer than three seeds that both have.
+std::optional<PairedDifference> paired_difference(const ComparedDataset& dataset,
+                                                  const std::string& base, const std::string& other,
+                                                  int iteration, const Column& column);
+/// The number of standard errors at which a two-sided interval of 95 % ends. freedom: at least 1.
+double student_t_95(int freedom);
+/// The method that others are compared with: gaussian, else the first; "" where there is none.
+std::string base_method(const Comparison& comparison);
+/// For PSNR, SSIM, LPIPS and FLIP after the last iteration, a row for each data set and method;
+/// none with fewer than three seeds.
+std::vector<Table> paired_tables(const Comparison& comparison);
+nlohmann::json paired_json(const Comparison& comparison);
 
 // Means over the data sets of a comparison: over all of them, and over those of each benchmark of
 // the paper, with the paper's own.
@@ -99,9 +120,9 @@ struct PulseChange {
 std::vector<PulseChange> pulse_changes(const Comparison& comparison, const ComparedDataset& dataset,
                                        int iteration);
 
-/// As sentences; all empty where there is no such kernel.
+/// As sentences and as a table; all empty where there is no such kernel.
 std::string pulse_lines(const Comparison& comparison, const ComparedDataset& dataset);
-std::string pulse_html(const Comparison& comparison, const ComparedDataset& dataset);
+Table pulse_table(const Comparison& comparison, const ComparedDataset& dataset);
 nlohmann::json pulse_json(const Comparison& comparison, const ComparedDataset& dataset);
 
 // Whether a scene wants one kernel or many: the shapes that splats learned in the runs of a
@@ -115,8 +136,8 @@ std::optional<LearnedShapes> learned_shapes(const SplatModel& model);
 void read_shapes_of(ComparedRun& run);
 
 /// A plot for each kernel that learns shapes, with a curve for each data set, and a table of
-/// percentiles, all from the first seed available; empty where there is no such kernel.
-std::string shapes_html(const Comparison& comparison);
+/// percentiles, all from the first seed available; nothing where there is no such kernel.
+void add_shapes(const Comparison& comparison, Report& report);
 nlohmann::json shapes_json(const LearnedShapes& shapes);
 
 }  // namespace darb

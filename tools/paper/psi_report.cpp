@@ -17,8 +17,7 @@
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/reference/parallel.h"
 #include "engine/report/html.h"
-#include "engine/report/svg_plot.h"
-#include "tools/paper/compare_report.h"
+#include "tools/paper/compare_pictures.h"
 
 namespace darb {
 
@@ -321,23 +320,31 @@ nlohmann::json fits_json(const std::vector<KernelFit>& fits) {
     return rows;
 }
 
-std::string fits_html(const std::vector<KernelFit>& fits) {
-    std::string html =
-        "<h2>In the shaders</h2><div class='wide'><table><tr><th>kernel</th><th>R^2</th><th>w, t = "
-        "q / R^2</th><th>error</th><th>error of the exact footprint</th><th>made from</th>"
-        "<th>drawn to</th></tr>\n";
+namespace {
+
+Table fits_of_shaders(const std::vector<KernelFit>& fits) {
+    using Kind = TableColumn::Kind;
+    Table table{"shaders", "In the shaders", "", {}, {}};
+    table.columns = {{"kernel", "", Better::neither, 0, Kind::name},
+                     {"R^2", "", Better::neither, 4},
+                     {"w, t = q / R^2", "", Better::neither, 0, Kind::name},
+                     {"error", "", Better::neither, 1, Kind::scientific},
+                     {"error of the exact footprint", "", Better::neither, 1, Kind::scientific},
+                     {"made from", "", Better::neither, 0, Kind::name},
+                     {"drawn to", "", Better::neither, 1, Kind::scientific}};
     for (const KernelFit& f : fits) {
         const double support = kernel_support(f.kernel);
-        html += fmt::format(
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
-            "</tr>\n",
-            html_escape(std::string(kernel_name(f.kernel))),
-            std::isfinite(support) ? fmt::format("{:.6g}", support) : "none", html_escape(f.form),
-            error_text(f.error), error_text(f.exact_error), html_escape(f.source),
-            f.source.empty() ? "" : error_text(f.source_error));
+        const bool own = !f.source.empty();
+        table.rows.push_back(
+            {{std::string(kernel_name(f.kernel)),
+              std::isfinite(support) ? TableCell(support) : TableCell("none"), f.form, f.error,
+              std::isnan(f.exact_error) ? TableCell("none") : TableCell(f.exact_error), f.source,
+              own ? TableCell(f.source_error) : TableCell()}});
     }
-    return html + "</table></div>\n";
+    return table;
 }
+
+}  // namespace
 
 namespace {
 
@@ -370,30 +377,27 @@ double shown_radius(const DerivedKernel& kernel) {
     return 1.1 * std::sqrt(std::min(kernel.row().support, 12.25));
 }
 
-std::string profiles(const std::vector<const DerivedKernel*>& kernels) {
+void add_profiles(const std::vector<const DerivedKernel*>& kernels, Report& report) {
     Plot w{"Kernels", "distance d (standard deviations)", "w", {}};
     Plot a{"Their true projections, peak 1", "distance d (standard deviations)", "A / A(0)", {}};
     Plot p{"The paper's splats: w(d / sqrt psi)", "distance d (standard deviations)", "w", {}};
     double end = 4;
     for (const DerivedKernel* k : kernels)
         if (std::isfinite(k->row().support)) end = std::max(end, 1.1 * std::sqrt(k->row().support));
+    std::vector<std::string> names;
     for (const DerivedKernel* k : kernels) {
         const std::string name(k->row().name);
+        names.push_back(name);
         w.series.push_back(curve(name, end, [&](double q) { return k->value(Footprint::psi, q); }));
         a.series.push_back(curve(name, end, [&](double q) { return projected_profile(*k, q); }));
         p.series.push_back(
             curve(name, end, [&](double q) { return k->value(Footprint::psi, q / k->psi()); }));
     }
-    std::vector<std::string> names;
-    for (const PlotSeries& s : w.series) names.push_back(s.name);
-    for (Plot* plot : {&w, &a, &p})
-        if (plot->series.size() > 1)
-            for (PlotSeries& s : plot->series) s.name.clear();
-    return html_legend(names) + "<div class='plots'>" + svg_plot(w) + svg_plot(a) + svg_plot(p) +
-           "</div>\n";
+    for (Plot* plot : {&w, &a, &p}) plot->legend_beside = true;
+    report.plots({{"kernels", w}, {"projections", a}, {"psi-splats", p}}, names);
 }
 
-std::string footprints(const PsiResult& r, const DerivedKernel& kernel) {
+void add_footprints(const PsiResult& r, const DerivedKernel& kernel, Report& report) {
     const auto truth = [&](double q) { return projected_profile(kernel, q); };
     const auto splat = [&](double scale) {
         return [&kernel, scale](double q) { return kernel.value(Footprint::psi, q / scale); };
@@ -409,7 +413,7 @@ std::string footprints(const PsiResult& r, const DerivedKernel& kernel) {
     };
     rest.series = {curve("psi", end, error(r.exact)), curve("least squares", end, error(r.best)),
                    curve("as it is", end, error(1))};
-    return "<div class='plots'>" + svg_plot(both) + svg_plot(rest) + "</div>\n";
+    report.plots({{r.kernel + " splats", both}, {r.kernel + " residuals", rest}});
 }
 
 double coordinate(int pixel) {
@@ -460,11 +464,13 @@ std::string fields(const PsiResult& r, const DerivedKernel& kernel) {
         190);
 }
 
-std::string spread_text(const PsiSpread& s) {
-    return fmt::format("{:.5f} ± {:.5f}", s.median, s.deviation);
+TableCell spread_cell(const PsiSpread& s) {
+    TableCell cell(s.median);
+    cell.deviation = s.deviation;
+    return cell;
 }
 
-std::string rings_part() {
+void add_rings(Report& report) {
     Plot plot{"Beyond the first pulse", "distance d (standard deviations)", "w", {}};
     for (const int kernel : {KERNEL_RAISED_COSINE_3_PULSES, KERNEL_SINC_3_PULSES}) {
         PlotSeries series{kernel == KERNEL_SINC_3_PULSES ? "|sinc|" : "raised cosine"};
@@ -475,34 +481,43 @@ std::string rings_part() {
         }
         plot.series.push_back(std::move(series));
     }
-    std::string html =
-        "<h2>Rings that the limit removes</h2><table><tr><th>kernel</th><th>pulses</th>"
-        "<th>radius</th><th>psi</th><th>of the mass beyond the first</th></tr>\n";
+    Table table{"rings", "Rings that the limit removes", "", {}, {}};
+    table.columns = {{"kernel", "", Better::neither, 0, TableColumn::Kind::name},
+                     {"pulses", "", Better::neither, 0},
+                     {"radius", "", Better::neither, 1},
+                     {"psi", "", Better::neither, 6},
+                     {"of the mass beyond the first", "%", Better::neither, 1}};
     for (const Rings& r : all_rings())
-        html += fmt::format(
-            "<tr><td>{}</td><td>{}</td><td>{:.1f}</td><td>{:.6f}</td><td>{:.1f} %</td></tr>\n",
-            kernel_name(r.kernel), r.pulses, r.radius, r.psi, 100 * r.outside);
-    return html + "</table>\n<div class='plots'>" + svg_plot(plot) + "</div>\n";
+        table.rows.push_back({{std::string(kernel_name(r.kernel)), double(r.pulses), r.radius,
+                               r.psi, 100 * r.outside}});
+    report.table(std::move(table), 2);
+    report.plots({{"", plot}});
 }
 
-std::string html_table(const std::vector<PsiResult>& results) {
-    std::string html =
-        "<div class='wide'><table><tr><th>kernel</th><th>grid xx</th><th>grid xy</th>"
-        "<th>grid yy</th><th>exact</th><th>least squares</th><th>psi: L2</th><th>max</th>"
-        "<th>as it is: L2</th><th>max</th><th>least squares: L2</th><th>max</th>"
-        "<th>exact footprint: L2</th><th>max</th></tr>\n";
+Table psi_figures(const std::vector<PsiResult>& results) {
+    using Kind = TableColumn::Kind;
+    Table table{"psi", "Every kernel", "", {}, {}};
+    table.columns = {{"kernel", "", Better::neither, 0, Kind::name}};
+    for (const char* name : {"grid xx", "grid xy", "grid yy"})
+        table.columns.push_back({name, "", Better::neither, 5});
+    for (const char* name : {"exact", "least squares"})
+        table.columns.push_back({name, "", Better::neither, 6});
+    for (const char* name : {"psi: L2", "max", "as it is: L2", "max", "least squares: L2", "max"})
+        table.columns.push_back({name, "", Better::neither, 4});
+    for (const char* name : {"exact footprint: L2", "max"})
+        table.columns.push_back({name, "", Better::neither, 1, Kind::scientific});
     for (const PsiResult& r : results) {
-        html += fmt::format(
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.6f}</td>"
-            "<td>{:.6f}</td>",
-            html_escape(r.kernel), spread_text(r.grid[0]), spread_text(r.grid[1]),
-            spread_text(r.grid[2]), r.exact, r.best);
-        for (const FootprintDistance& d : {r.by_psi, r.by_one, r.by_best})
-            html += fmt::format("<td>{:.4f}</td><td>{:.4f}</td>", d.l2, d.linf);
-        html += fmt::format("<td>{:.1e}</td><td>{:.1e}</td></tr>\n", r.by_exact_footprint.l2,
-                            r.by_exact_footprint.linf);
+        TableRow& row = table.rows.emplace_back();
+        row.cells = {r.kernel,
+                     spread_cell(r.grid[0]),
+                     spread_cell(r.grid[1]),
+                     spread_cell(r.grid[2]),
+                     r.exact,
+                     r.best};
+        for (const FootprintDistance& d : {r.by_psi, r.by_one, r.by_best, r.by_exact_footprint})
+            row.cells.insert(row.cells.end(), {TableCell(d.l2), TableCell(d.linf)});
     }
-    return html + "</table></div>\n";
+    return table;
 }
 
 }  // namespace
@@ -558,28 +573,31 @@ nlohmann::json psi_json(const std::vector<PsiResult>& results, const PsiGridOpti
             {"cells", options.cells},  {"seed", options.seed}, {"kernels", kernels}};
 }
 
-std::string psi_html(const std::vector<PsiResult>& results,
-                     const std::vector<const DerivedKernel*>& kernels,
-                     const std::vector<KernelFit>& fits, const PsiGridOptions& options) {
-    std::string body =
-        "<h2>Every kernel</h2>" + html_table(results) + profiles(kernels) + fits_html(fits);
-    for (std::size_t i = 0; i < results.size(); ++i)
-        body += "<h2>" + html_escape(results[i].kernel) + "</h2>" +
-                fields(results[i], *kernels[i]) + footprints(results[i], *kernels[i]);
-    body +=
-        rings_part() +
-        fmt::format(
-            "<h2>How to read it</h2><p>Grid: the paper's experiment, {} random covariances on {}^3 "
-            "cells: density within the support, summed along z, its weighted 2D covariance over "
-            "the 2x2 block of the 3D one; median and standard deviation, for xx, xy and yy apart. "
-            "Exact: a third of the ratio of the fourth and the second radial moment. Least "
-            "squares: the scale of the covariance that brings the splat nearest to the "
-            "projection.</p><p>Distances: "
-            "between profiles with peak 1 over the image plane, relative L2 and largest. The exact "
-            "footprint is evaluated in float32, as the shaders have it.</p>\n",
-            options.samples, options.cells);
-    return html_page("The correction factor psi",
-                     "The kernel's splat beside the true projection of the same 3D kernel", body);
+Report psi_report(const std::vector<PsiResult>& results,
+                  const std::vector<const DerivedKernel*>& kernels,
+                  const std::vector<KernelFit>& fits, const PsiGridOptions& options) {
+    Report report("The correction factor psi",
+                  "The kernel's splat beside the true projection of the same 3D kernel");
+    report.table(psi_figures(results), 2);
+    add_profiles(kernels, report);
+    report.table(fits_of_shaders(fits), 2);
+    for (std::size_t i = 0; i < results.size(); ++i) {
+        report.heading(results[i].kernel);
+        report.html(fields(results[i], *kernels[i]));
+        add_footprints(results[i], *kernels[i], report);
+    }
+    add_rings(report);
+    report.html(fmt::format(
+        "<h2>How to read it</h2><p>Grid: the paper's experiment, {} random covariances on {}^3 "
+        "cells: density within the support, summed along z, its weighted 2D covariance over "
+        "the 2x2 block of the 3D one; median and standard deviation, for xx, xy and yy apart. "
+        "Exact: a third of the ratio of the fourth and the second radial moment. Least "
+        "squares: the scale of the covariance that brings the splat nearest to the "
+        "projection.</p><p>Distances: "
+        "between profiles with peak 1 over the image plane, relative L2 and largest. The exact "
+        "footprint is evaluated in float32, as the shaders have it.</p>\n",
+        options.samples, options.cells));
+    return report;
 }
 
 Rings rings_of(int kernel, int pulses) {

@@ -10,6 +10,7 @@
 
 #include "engine/kernels/kernel_coefficients.h"
 #include "engine/kernels/kernel_profile.h"
+#include "engine/report/report.h"
 
 namespace darb {
 
@@ -72,14 +73,13 @@ std::string shapes_table(const std::vector<int>& kernels);
 nlohmann::json shapes_json(const std::vector<int>& kernels);
 std::string fits_table(const std::vector<KernelFit>& fits);
 nlohmann::json fits_json(const std::vector<KernelFit>& fits);
-std::string fits_html(const std::vector<KernelFit>& fits);
 
 std::string psi_table(const std::vector<PsiResult>& results);
 nlohmann::json psi_json(const std::vector<PsiResult>& results, const PsiGridOptions& options);
 /// kernels and fits: those of the results, in order.
-std::string psi_html(const std::vector<PsiResult>& results,
-                     const std::vector<const DerivedKernel*>& kernels,
-                     const std::vector<KernelFit>& fits, const PsiGridOptions& options);
+Report psi_report(const std::vector<PsiResult>& results,
+                  const std::vector<const DerivedKernel*>& kernels,
+                  const std::vector<KernelFit>& fits, const PsiGridOptions& options);
 
 // The pulses that the paper's limits remove: raised cosine and sinc oscillate beyond their first
 // pulse. This measures what more pulses would do to psi, and to where the mass of a splat lies.

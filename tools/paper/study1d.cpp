@@ -13,7 +13,6 @@
 #include "engine/core/quantile.h"
 #include "engine/reference/parallel.h"
 #include "engine/report/html.h"
-#include "engine/report/svg_plot.h"
 #include "tools/paper/sim1d_terms.h"
 
 namespace darb {
@@ -156,74 +155,74 @@ nlohmann::json number(const std::optional<double>& v) {
     return v ? number(*v) : nlohmann::json(nullptr);
 }
 
-std::string path_of(const std::vector<float>& values, double left, double top) {
-    std::string path;
+std::vector<PathStep> path_of(const std::vector<float>& values, double left, double top) {
+    std::vector<PathStep> path;
     const std::size_t stride = std::max<std::size_t>(1, values.size() / kCurvePoints);
     for (std::size_t i = 0; i < values.size(); i += stride) {
         const double x =
             left + kCellWidth * static_cast<double>(i) / static_cast<double>(values.size() - 1);
         const double v = std::clamp(static_cast<double>(values[i]), kLowest, kHighest);
         const double y = top + kCellHeight * (kHighest - v) / (kHighest - kLowest);
-        path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? 'M' : 'L', x, y);
+        path.push_back({path.empty() ? 'M' : 'L', x, y});
     }
     return path;
 }
 
-std::string grid_figure(const Study1dResult& result, std::size_t signal) {
+Drawing grid_figure(const Study1dResult& result, std::size_t signal) {
     const Study1dOptions& o = result.options;
-    const double width = kNameWidth + (kCellWidth + 8) * static_cast<double>(o.primitives.size());
-    const double height = kHead + (kCellHeight + 8) * static_cast<double>(o.kernels.size());
     const std::string name(signal_name(o.signals[signal]));
-    std::string svg = fmt::format(
-        "<svg viewBox='0 0 {:.0f} {:.0f}' role='img' aria-label='{} and its fits'><text "
-        "class='name' x='6' y='18'>{}</text>",
-        width, height, html_escape(name), html_escape(name));
+    Drawing drawing;
+    drawing.width = kNameWidth + (kCellWidth + 8) * static_cast<double>(o.primitives.size());
+    drawing.height = kHead + (kCellHeight + 8) * static_cast<double>(o.kernels.size());
+    drawing.title = name + " and its fits";
+    drawing.add_text("name", 6, 18, name);
     const std::vector<float> target =
         sample_signal(signals_1d()[static_cast<std::size_t>(o.signals[signal])], o.fit.samples);
     for (std::size_t n = 0; n < o.primitives.size(); ++n)
-        svg += fmt::format("<text class='label' x='{:.0f}' y='38'>N = {}</text>",
-                           kNameWidth + (kCellWidth + 8) * static_cast<double>(n), o.primitives[n]);
+        drawing.add_text("label", kNameWidth + (kCellWidth + 8) * static_cast<double>(n), 38,
+                         fmt::format("N = {}", o.primitives[n]));
+    constexpr int kGrey = 7, kOrange = 1;  // series
     for (std::size_t k = 0; k < o.kernels.size(); ++k) {
         const double top = kHead + (kCellHeight + 8) * static_cast<double>(k);
-        svg += fmt::format("<text class='tick' x='6' y='{:.0f}'>{}</text>", top + kCellHeight / 2,
-                           kernel_1d_name(o.kernels[k]));
+        drawing.add_text("tick", 6, top + kCellHeight / 2,
+                         std::string(kernel_1d_name(o.kernels[k])));
         for (std::size_t n = 0; n < o.primitives.size(); ++n) {
             const double left = kNameWidth + (kCellWidth + 8) * static_cast<double>(n);
             const Study1dRow& row = result.row(signal, k, n);
-            svg += fmt::format("<path class='line s7' d='{}'/>", path_of(target, left, top));
+            drawing.add_path("line", path_of(target, left, top), kGrey);
             if (!row.shown.empty())
-                svg += fmt::format(
-                    "<path class='line s1' d='{}'/>",
-                    path_of(evaluate_1d(row.kernel, row.shown, o.fit.samples), left, top));
+                drawing.add_path(
+                    "line", path_of(evaluate_1d(row.kernel, row.shown, o.fit.samples), left, top),
+                    kOrange);
             const std::string failed = row.failed > 0 ? fmt::format(", {} failed", row.failed) : "";
-            svg += fmt::format("<text class='tick' x='{:.0f}' y='{:.0f}'>{}{}</text>", left,
-                               top + 10, loss_text(row.median), failed);
+            drawing.add_text("tick", left, top + 10, loss_text(row.median) + failed);
         }
     }
-    return svg + "</svg>\n";
+    return drawing;
 }
 
-std::string curves(const Study1dResult& result, std::size_t signal) {
+std::vector<Figure> curves(const Study1dResult& result, std::size_t signal) {
     const Study1dOptions& o = result.options;
     const std::vector<int> steps = curve_steps(o.fit.steps);
-    std::string html;
+    std::vector<Figure> figures;
     for (std::size_t n = 0; n < o.primitives.size(); ++n) {
         Plot plot{fmt::format("{}, N = {}", signal_name(o.signals[signal]), o.primitives[n]),
                   "steps",
                   "mean squared error, median",
                   {},
                   true};
-        plot.log_x = true;
+        plot.log_x = plot.legend_beside = true;
         for (std::size_t k = 0; k < o.kernels.size(); ++k) {
             const Study1dRow& row = result.row(signal, k, n);
-            PlotSeries series;
+            PlotSeries series{std::string(kernel_1d_name(o.kernels[k]))};
             for (std::size_t i = 0; i < row.curve.size(); ++i)
                 series.points.emplace_back(std::max(steps[i], 1), row.curve[i]);
             plot.series.push_back(std::move(series));
         }
-        html += svg_plot(plot);
+        figures.push_back(
+            {fmt::format("loss {} {}", signal_name(o.signals[signal]), o.primitives[n]), plot});
     }
-    return "<div class='plots'>" + html + "</div>\n";
+    return figures;
 }
 
 /// How many kernels have a smaller median: 0 for the best, and for all that tie with it. A kernel
@@ -282,42 +281,52 @@ std::string ratio_text(const Standing& s, std::size_t signals) {
            (all ? "" : fmt::format("/{}", s.compared));
 }
 
-std::string html_standings(const Study1dResult& result) {
+Table standings_table(const Study1dResult& result) {
     const Study1dOptions& o = result.options;
-    std::string html = fmt::format(
-        "<p class='soft'>Ratio: geometric mean over the signals of the median loss over the "
-        "gaussian's; {}. Won: signals with the least median loss.</p><div class='wide'><table><tr>"
-        "<th>kernel</th>",
-        kFewer);
-    for (const int n : o.primitives)
-        html += fmt::format("<th>N = {}: ratio</th><th>won</th><th>failed</th>", n);
-    html += "</tr>\n";
+    Table table{"standings",
+                "Over all signals",
+                fmt::format("Ratio: geometric mean over the signals of the median loss over the "
+                            "gaussian's; {}. Won: signals with the least median loss.",
+                            kFewer),
+                {{"kernel", "", Better::neither, 0, TableColumn::Kind::name}},
+                {}};
+    for (const int n : o.primitives) {
+        table.columns.push_back({fmt::format("N = {}: ratio", n)});
+        table.columns.push_back({"won", "", Better::neither, 0});
+        table.columns.push_back({"failed", "", Better::neither, 0});
+    }
     const auto all = standings(result);
     for (std::size_t k = 0; k < o.kernels.size(); ++k) {
-        html += fmt::format("<tr><td>{}</td>", kernel_1d_name(o.kernels[k]));
+        TableRow& row = table.rows.emplace_back();
+        row.cells = {std::string(kernel_1d_name(o.kernels[k]))};
         for (const Standing& s : all[k])
-            html += fmt::format("<td>{}</td><td>{}</td><td>{}</td>",
-                                ratio_text(s, o.signals.size()), s.wins, s.failed);
-        html += "</tr>\n";
+            row.cells.insert(row.cells.end(), {TableCell(ratio_text(s, o.signals.size())),
+                                               TableCell(s.wins), TableCell(s.failed)});
     }
-    return html + "</table></div>\n";
+    return table;
 }
 
-std::string html_rows(const Study1dResult& result) {
-    std::string html =
-        "<div class='wide'><table><tr><th>signal</th><th class='left'>kernel"
-        "</th><th>N</th><th>final loss, median</th><th>quartiles</th><th>range</th>"
-        "<th>failed</th><th>reached the target</th><th>steps to it</th><th>ms to it</th>"
-        "<th>ms a run</th></tr>\n";
+Table losses_table(const Study1dResult& result) {
+    using Kind = TableColumn::Kind;
+    Table table{"rows", "Every row", "", {}, {}};
+    table.columns = {{"signal", "", Better::neither, 0, Kind::name},
+                     {"kernel", "", Better::neither, 0, Kind::name},
+                     {"N", "", Better::neither, 0},
+                     {"final loss, median", "", Better::neither, 2, Kind::scientific},
+                     {"quartiles", "", Better::neither, 2, Kind::scientific},
+                     {"range", "", Better::neither, 2, Kind::scientific},
+                     {"failed", "", Better::neither, 0},
+                     {"reached the target", "", Better::neither, 0},
+                     {"steps to it", "", Better::neither, 0},
+                     {"ms to it", "", Better::neither, 1},
+                     {"ms a run", "", Better::neither, 0}};
     for (const Study1dRow& r : result.rows)
-        html += fmt::format(
-            "<tr><td>{}</td><td class='left'>{}</td><td>{}</td><td>{}</td><td>{} to {}</td>"
-            "<td>{} to {}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.0f}</td></tr>\n",
-            signal_name(r.signal), kernel_1d_name(r.kernel), r.primitives, loss_text(r.median),
-            loss_text(r.quartile1), loss_text(r.quartile3), loss_text(r.low), loss_text(r.high),
-            r.failed, r.reached, r.steps_to ? fmt::format("{:.0f}", *r.steps_to) : "-",
-            r.seconds_to ? fmt::format("{:.1f}", 1e3 * *r.seconds_to) : "-", 1e3 * r.seconds);
-    return html + "</table></div>\n";
+        table.rows.push_back(
+            {{std::string(signal_name(r.signal)), std::string(kernel_1d_name(r.kernel)),
+              double(r.primitives), r.median, TableCell::between(r.quartile1, r.quartile3),
+              TableCell::between(r.low, r.high), double(r.failed), double(r.reached), r.steps_to,
+              r.seconds_to ? TableCell(1e3 * *r.seconds_to) : TableCell(), 1e3 * r.seconds}});
+    return table;
 }
 
 }  // namespace
@@ -387,28 +396,34 @@ nlohmann::json study_1d_json(const Study1dResult& result) {
             {"rows", rows}};
 }
 
-std::string study_1d_html(const Study1dResult& result) {
+Report study_1d_report(const Study1dResult& result) {
     const Study1dOptions& o = result.options;
+    Report report("Kernels in one dimension",
+                  "Signals as sums of N kernels, fitted by Adam: the paper's Figures 5 to 11");
     std::vector<std::string> names;
     for (const int k : o.kernels) names.emplace_back(kernel_1d_name(k));
-    std::string body = "<h2>Over all signals</h2>" + html_standings(result) +
-                       "<h2>Signals and fits</h2><p class='soft'>Grey: the signal; orange: the run "
-                       "with the median loss, which stands in the cell.</p><div class='plots'>";
-    for (std::size_t s = 0; s < o.signals.size(); ++s) body += grid_figure(result, s);
-    body += "</div>\n<h2>Loss</h2>" + html_legend(names);
-    for (std::size_t s = 0; s < o.signals.size(); ++s) body += curves(result, s);
-    body += "<h2>Every row</h2>" + html_rows(result);
-    body += fmt::format(
+    report.table(standings_table(result), 2);
+    report.heading("Signals and fits");
+    report.html(
+        "<p class='soft'>Grey: the signal; orange: the run with the median loss, which "
+        "stands in the cell.</p>");
+    std::vector<Figure> grids;
+    for (std::size_t s = 0; s < o.signals.size(); ++s)
+        grids.push_back({"", grid_figure(result, s)});
+    report.plots(std::move(grids));
+    report.heading("Loss");
+    for (std::size_t s = 0; s < o.signals.size(); ++s)
+        report.plots(curves(result, s), s == 0 ? names : std::vector<std::string>());
+    report.table(losses_table(result), 2);
+    report.html(fmt::format(
         "<h2>How it was done</h2><p>{} samples on [-10, 10]; {} steps of Adam at rate {} on the "
         "mean squared error; {} seeds, which give every kernel the same start. Widths are fitted "
         "as logarithms. A run has failed where its loss is not finite or it explains less than "
         "half of the signal. Target: a loss of {} of the signal's mean square; times are of one "
         "thread. Profiles: the float32 polynomials of the shaders, one pulse within their support; "
         "|sinc| and sinc are then one kernel.</p>\n",
-        o.fit.samples, o.fit.steps, o.fit.learning_rate, o.seeds, o.target_share);
-    return html_page("Kernels in one dimension",
-                     "Signals as sums of N kernels, fitted by Adam: the paper's Figures 5 to 11",
-                     body);
+        o.fit.samples, o.fit.steps, o.fit.learning_rate, o.seeds, o.target_share));
+    return report;
 }
 
 }  // namespace darb

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/report/report.h"
 #include "tools/paper/approximate1d.h"
 
 namespace darb {
@@ -56,7 +57,7 @@ Study1dResult study_1d(const Study1dOptions& options,
 
 std::string study_1d_table(const Study1dResult& result);
 nlohmann::json study_1d_json(const Study1dResult& result);
-/// A page with tables, grids of fits (rows kernels, columns N) and loss curves.
-std::string study_1d_html(const Study1dResult& result);
+/// Tables, grids of fits (rows kernels, columns N) and loss curves.
+Report study_1d_report(const Study1dResult& result);
 
 }  // namespace darb

@@ -249,6 +249,16 @@ std::optional<DepthError> depth_means(const std::vector<ViewMetrics>& views) {
     return DepthError{sum.mean_m / count, sum.median_m / count};
 }
 
+std::optional<double> flip_mean(const std::vector<ViewMetrics>& views, bool in_arc) {
+    double sum = 0, count = 0;
+    for (const ViewMetrics& v : views) {
+        if (v.in_arc != in_arc || !v.flip || std::isnan(*v.flip)) continue;
+        sum += *v.flip;
+        ++count;
+    }
+    return count > 0 ? std::optional(sum / count) : std::nullopt;
+}
+
 }  // namespace
 
 void take_means(Evaluation& evaluation) {
@@ -260,6 +270,7 @@ void take_means(Evaluation& evaluation) {
     const ArcMeans& means = others.views > 0 ? others : arc;
     evaluation.psnr_db = means.psnr_db;
     evaluation.ssim = means.ssim;
+    evaluation.flip = flip_mean(evaluation.views, others.views == 0);
 }
 
 Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,

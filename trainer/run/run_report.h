@@ -87,6 +87,7 @@ struct Evaluation {
     double psnr_db = 0, ssim = 0;  // means over the views; but for an arc, where others are there
     std::optional<ArcMeans> arc;   // where others are there
     std::optional<DepthError> depth;  // means over the views that have one
+    std::optional<double> flip;       // mean over the views that have it; but for an arc, as above
 };
 
 /// Means of the views, those of an arc apart where others are there, too; but for views that are

@@ -15,7 +15,7 @@
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "engine/kernels/kernel_family.h"
-#include "tools/paper/compare_report.h"
+#include "tools/paper/compare_pictures.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
 
@@ -167,35 +167,121 @@ TEST_F(CompareFolder, Crops_areWhereTheKernelsDifferMost) {
     EXPECT_EQ(crops[0].photo.width, 24);
 }
 
-TEST(CompareStats, Marks_areTheBestAndTheThirdBest) {
-    const Column& psnr = quality_columns()[0];     // more is better, two decimals
-    const Column& seconds = quality_columns()[6];  // less is better, one decimal
-    const auto none = Mark::none, best = Mark::best, third = Mark::third;
-    EXPECT_EQ(marks_of({1.0, 4.0, std::nullopt, 3.0, 2.0}, psnr),
-              (Marks{none, best, none, none, third}));
-    EXPECT_EQ(marks_of({1.0, 4.0, std::nullopt, 3.0, 2.0}, seconds),
-              (Marks{best, none, none, third, none}));
-    EXPECT_EQ(marks_of({1.0}, psnr), Marks{none});
+TEST_F(CompareFolder, TellingViews_areThoseWhereMethodsDiffer) {
+    // photo | render | error, 40 x 30 each; the photo is black.
+    std::vector<ComparedAt> methods(3);
+    for (int m = 0; m < 3; ++m)
+        for (const char* view : {"alike", "apart"}) {
+            ImageU8 all(120, 30, 3);
+            const bool apart = std::string(view) == "apart";
+            for (int y = 22; y < 26; ++y)
+                for (int x = 30; x < 34; ++x)
+                    for (int c = 0; c < 3; ++c)
+                        all.at(40 + x, y, c) = static_cast<std::uint8_t>(apart ? 80 * m : 250);
+            const fs::path path = folder_ / fmt::format("{}{}.png", view, m);
+            write_png(path, all);
+            methods[m].views.push_back({view, 20, 0, {}, path});
+        }
+    const std::vector<const ComparedAt*> all{&methods[0], &methods[1], &methods[2]};
+    const std::vector<TellingView> views = telling_views(all, 5);
+    ASSERT_EQ(views.size(), 2u);
+    EXPECT_EQ(views[0].view, "apart") << "not where all are equally wrong";
+    EXPECT_EQ(views[0].side, 24);
+    EXPECT_GE(views[0].x + 24, 34);
+    EXPECT_GE(views[0].y + 24, 26);
+    EXPECT_EQ(views[0].square_error[0], 0);
+    EXPECT_NEAR(views[0].square_error[2], 16 * std::pow(160 / 255.0, 2) / (24 * 24), 1e-9);
+    EXPECT_NEAR(views[1].spread, 0, 1e-9);
+    EXPECT_EQ(telling_views(all, 1).size(), 1u);
+    EXPECT_TRUE(telling_views({&methods[0]}, 1).empty()) << "one method differs from none";
+    fs::remove(methods[2].views[1].picture);
+    EXPECT_EQ(telling_views(all, 5).size(), 1u) << "every method has to have a picture";
 }
 
-TEST(CompareStats, Marks_ofValuesThatPrintAlike_areAlike) {
-    const Column& psnr = quality_columns()[0];
-    const auto none = Mark::none, best = Mark::best, third = Mark::third;
-    EXPECT_EQ(marks_of({27.112, 27.114, 20.0, 20.001, 19.0}, psnr),
-              (Marks{best, best, third, third, none}));
-    EXPECT_EQ(marks_of({27.112, 27.114}, psnr), (Marks{none, none}));
-    EXPECT_EQ(marks_of({27.112, 27.11, 27.114, 20.0}, psnr), (Marks{best, best, best, none}));
+/// A run for each value, seeds rising from 0.
+void add_runs(ComparedDataset& dataset, const std::string& kernel,
+              const std::vector<double>& psnr_db) {
+    for (std::size_t seed = 0; seed < psnr_db.size(); ++seed) {
+        ComparedRun& run = dataset.runs.emplace_back();
+        run.kernel = kernel;
+        run.seed = seed;
+        run.at.emplace_back();
+        run.at[0].iteration = 7000;
+        run.at[0].psnr_db = psnr_db[seed];
+        run.at[0].ssim = psnr_db[seed] / 40;
+        run.curve = {{1, 1, psnr_db[seed], 5}, {2, 2, psnr_db[seed] / 2, 5}};
+    }
 }
 
-TEST(CompareStats, Marks_overSeedsAreOfWhatNoOtherOverlaps) {
+TEST(CompareStats, StudentsT_isThatOfTables) {
+    // Two-sided 95 %, from the NIST handbook's table.
+    for (const auto& [freedom, t] : {std::pair{1, 12.706},
+                                     {2, 4.303},
+                                     {3, 3.182},
+                                     {4, 2.776},
+                                     {5, 2.571},
+                                     {9, 2.262},
+                                     {10, 2.228},
+                                     {30, 2.042}})
+        EXPECT_NEAR(student_t_95(freedom), t, 5e-4) << freedom;
+}
+
+TEST(CompareStats, PairedDifferences_areOfEqualSeeds) {
+    Comparison c;
+    c.kernels = {"gaussian", "sinc"};
+    c.iterations = {7000};
+    c.seeds = 3;
+    ComparedDataset& set = c.datasets.emplace_back();
+    set.name = "set";
+    add_runs(set, "gaussian", {20, 25, 30});
+    add_runs(set, "sinc", {21, 26.1, 30.9});
     const Column& psnr = quality_columns()[0];
-    const auto none = Mark::none, best = Mark::best;
-    const OverSeeds far{29.0, 28.8, 29.2, 3}, near{28.9, 28.7, 29.1, 3}, low{27.0, 26.5, 27.5, 3};
-    EXPECT_EQ(marks_over_seeds({far, low, low}, psnr), (Marks{best, none, none}));
-    EXPECT_EQ(marks_over_seeds({far, near, low}, psnr), (Marks{none, none, none}));
-    EXPECT_EQ(marks_over_seeds({{29.0, 29.0, 29.0, 1}, {28.9, 28.9, 28.9, 1}}, psnr),
-              (Marks{best, none}));
-    EXPECT_EQ(marks_over_seeds({far, OverSeeds{}}, psnr), (Marks{none, none}));
+    const auto d = paired_difference(set, "gaussian", "sinc", 7000, psnr);
+    ASSERT_TRUE(d);
+    EXPECT_EQ(d->seeds, 3);
+    EXPECT_NEAR(d->mean, 1, 1e-12);
+    EXPECT_NEAR(d->high - d->low, 2 * 4.3027 * 0.1 / std::sqrt(3.0), 1e-4);
+    EXPECT_TRUE(d->clear()) << "though the seeds differ by more than the kernels";
+    const std::vector<Table> tables = paired_tables(c);
+    ASSERT_EQ(tables.size(), 2u) << "PSNR and SSIM; there is no LPIPS";
+    EXPECT_EQ(tables[0].rows[0].cells[5].text, "yes");
+    EXPECT_EQ(comparison_json(c)["paired"].size(), 2u);
+    set.runs.pop_back();
+    EXPECT_FALSE(paired_difference(set, "gaussian", "sinc", 7000, psnr)) << "two seeds are few";
+    EXPECT_TRUE(paired_tables(c).empty());
+}
+
+TEST(CompareStats, SeveralSeeds_areMeansWithBands) {
+    Comparison c;
+    c.kernels = {"gaussian", "sinc"};
+    c.iterations = {7000};
+    c.seeds = 3;
+    add_runs(c.datasets.emplace_back(), "gaussian", {20, 22, 27});
+    const OverSeeds three = over_seeds(c.datasets[0], "gaussian", 7000, quality_columns()[0]);
+    EXPECT_EQ(*three.mean, 23);
+    EXPECT_EQ(*three.median, 22);
+    EXPECT_NEAR(*three.deviation, std::sqrt(13.0), 1e-12);
+    const std::string page = comparison_report(c).page();
+    EXPECT_NE(page.find("23.00 \u00b1 3.61"), std::string::npos);
+    EXPECT_NE(page.find("class='band s0'"), std::string::npos);
+    EXPECT_NE(comparison_table(c).find("23.00 +- 3.61"), std::string::npos) << comparison_table(c);
+}
+
+TEST(CompareStats, SeveralDataSets_areRowsWithTheirMean) {
+    Comparison c;
+    c.kernels = {"gaussian", "sinc"};
+    c.iterations = {7000};
+    for (const double more : {0.0, 4.0}) {
+        ComparedDataset& set = c.datasets.emplace_back();
+        set.name = more > 0 ? "two" : "one";
+        add_runs(set, "gaussian", {20 + more});
+        add_runs(set, "sinc", {21 + more});
+    }
+    const std::vector<Table> tables = tables_by_dataset(c, 7000);
+    ASSERT_EQ(tables.size(), 2u);
+    ASSERT_EQ(tables[0].rows.size(), 3u);
+    EXPECT_EQ(tables[0].rows[2].cells[1].value, 22);
+    EXPECT_EQ(marks_of(tables[0])[2], (std::vector<Mark>{Mark::none, Mark::none, Mark::best}));
 }
 
 TEST(CompareStats, MeansOverDataSets_leaveOutWhereAKernelFailed) {
@@ -217,7 +303,7 @@ TEST(CompareStats, MeansOverDataSets_leaveOutWhereAKernelFailed) {
         }
         c.datasets.push_back(dataset);
     }
-    const std::string page = comparison_html(c);
+    const std::string page = comparison_report(c).page();
     EXPECT_NE(page.find("<tr><td>gaussian</td><td>21.88</td>"), std::string::npos);
     EXPECT_EQ(page.find("<td>44.58</td>"), std::string::npos);
     EXPECT_NE(page.find("<tr><td>data sets</td><td>2</td>"), std::string::npos);
@@ -245,7 +331,7 @@ TEST(CompareStats, MeansOfBenchmarks_standApartBesideThePapers) {
     EXPECT_EQ(*means[1].values[0][0], 21);
     EXPECT_NEAR(*means[1].paper[0][0], 21.864, 1e-9);
     EXPECT_EQ(means[1].covered[0], 2);
-    EXPECT_NE(comparison_html(c).find("<tr><td>gaussian, the paper</td><td>21.86</td>"),
+    EXPECT_NE(comparison_report(c).page().find("<tr><td>gaussian, the paper</td><td>21.86</td>"),
               std::string::npos);
     c.datasets = {c.datasets[0], c.datasets[2]};
     EXPECT_EQ(means_of(c, 7000, quality_columns()).size(), 1u);
@@ -261,10 +347,10 @@ TEST(CompareStats, LpipsColumn_isLeftOutWithoutAValue) {
     run.at[0].iteration = 7000;
     c.datasets.push_back({"set", "set", {run}});
     EXPECT_EQ(comparison_table(c).find("LPIPS"), std::string::npos);
-    EXPECT_EQ(comparison_html(c).find("<th>LPIPS</th>"), std::string::npos);
+    EXPECT_EQ(comparison_report(c).page().find("<th>LPIPS</th>"), std::string::npos);
     c.datasets[0].runs[0].at[0].lpips = 0.25;
     EXPECT_NE(comparison_table(c).find("LPIPS"), std::string::npos);
-    EXPECT_NE(comparison_html(c).find("<th>LPIPS</th>"), std::string::npos);
+    EXPECT_NE(comparison_report(c).page().find("<th>LPIPS</th>"), std::string::npos);
 }
 
 TEST(ComparePulses, MoreAgainstOne_isJudgedByModelAndPsnr) {
@@ -300,7 +386,7 @@ TEST(ComparePulses, MoreAgainstOne_isJudgedByModelAndPsnr) {
               std::string::npos)
         << comparison_table(c);
     EXPECT_FALSE(changes[0].less_ssim());  // both 0
-    EXPECT_NE(comparison_html(c).find("More pulses against one"), std::string::npos);
+    EXPECT_NE(comparison_report(c).page().find("More pulses against one"), std::string::npos);
 }
 
 TEST(CompareStats, Medians_takeWhatThereIsOfFailedRuns) {
@@ -317,14 +403,14 @@ TEST(CompareStats, Medians_takeWhatThereIsOfFailedRuns) {
     const OverSeeds v = over_seeds(dataset, "sinc", 7000, quality_columns()[0]);
     EXPECT_EQ(v.count, 3);
     EXPECT_EQ(*v.median, 21);
-    EXPECT_EQ(spread_text(v, 2), "21.00 (20.00 to 24.00)");
+    EXPECT_EQ(cell_text(v.cell(), {"PSNR", "dB"}), "21.67 \u00b1 2.08");
     EXPECT_FALSE(over_seeds(dataset, "sinc", 30000, quality_columns()[0]).median);
     Comparison c;
     c.datasets = {dataset};
     c.kernels = {"sinc", "gaussian"};
     c.iterations = {7000};
-    EXPECT_NE(comparison_html(c).find("diverged"), std::string::npos);
-    EXPECT_NE(comparison_table(c).find("21.00"), std::string::npos);
+    EXPECT_NE(comparison_report(c).page().find("diverged"), std::string::npos);
+    EXPECT_NE(comparison_table(c).find("21.67"), std::string::npos);
     EXPECT_EQ(comparison_json(c)["datasets"][0]["medians"][1]["psnr_db"], nullptr);
 }
 
@@ -407,13 +493,18 @@ TEST(LearnedShapes, Page_hasACurveForEachDataSet) {
         run.shapes = LearnedShapes{{1, 4, 16}, {0.25, 0.75}, {1.5, 2.5, 5.5, 6.5, 7.5}};
         dataset.runs.push_back(run);
     }
-    const std::string html = shapes_html(c);
+    const auto page = [&] {
+        Report report("", "");
+        add_shapes(c, report);
+        return report.page();
+    };
+    const std::string html = page();
     EXPECT_NE(html.find("Learned by beta"), std::string::npos);
     EXPECT_EQ(html.find("Learned by gaussian"), std::string::npos);
     EXPECT_NE(html.find("class='line s1'"), std::string::npos) << "the second data set";
     EXPECT_NE(html.find("<td>&lt;one&gt;</td><td>1.5</td>"), std::string::npos) << html;
     c.datasets.clear();
-    EXPECT_EQ(shapes_html(c), "");
+    EXPECT_EQ(page().find("One kernel"), std::string::npos);
 }
 
 }  // namespace

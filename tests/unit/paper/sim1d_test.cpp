@@ -111,7 +111,7 @@ TEST(Study1d, Result_repeatsOnAnyNumberOfThreadsAndCountsFailures) {
     options.signals = {0};
     options.fit.learning_rate = 50;  // and this one throws every kernel far away
     EXPECT_GT(study_1d(options, none).rows[0].failed, 0);
-    EXPECT_NE(study_1d_html(one).find("sawtooth"), std::string::npos);
+    EXPECT_NE(study_1d_report(one).page().find("sawtooth"), std::string::npos);
     EXPECT_NE(study_1d_table(one).find("parabolic"), std::string::npos);
 }
 

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// What a plot is made of, as shapes, and its three writers: an SVG element inside a page, an SVG
+// file that stands alone, and a PDF file of vectors. The plots of svg_plot.h make such drawings.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace darb {
+
+/// Colours of the series on white, as #rrggbb: s0, s1, ... of the page's style.
+const std::vector<std::string>& series_colours();
+
+enum class Anchor { start, middle, end };
+
+struct PathStep {
+    char command = 'M';  // M: begins a line, L: goes on with it, z: closes it
+    double x = 0, y = 0;
+};
+
+struct Shape {
+    enum class Kind { path, circle, text } kind = Kind::path;
+    /// Its class on the page: line, area, band, grid, axis, whisker; name, label or tick for text;
+    /// "" for a circle.
+    std::string style;
+    int series = -1;  // colour; -1: that of the style
+    std::vector<PathStep> path;
+    double x = 0, y = 0, radius = 0;  // of a circle, or where a text stands
+    std::string text;
+    Anchor anchor = Anchor::start;
+    bool upright = false;  // the text runs upwards
+    std::string hint;      // shown under the pointer
+};
+
+/// In user units, which are px of the page; y goes down.
+struct Drawing {
+    double width = 0, height = 0;
+    std::string title;
+    std::string kind;  // a CSS class of the element
+    std::vector<Shape> shapes;
+
+    bool empty() const { return shapes.empty(); }
+    void add_path(std::string style, std::vector<PathStep> path, int series = -1,
+                  std::string hint = {});
+    void add_circle(double x, double y, double radius, int series, std::string hint = {});
+    void add_text(std::string style, double x, double y, std::string text,
+                  Anchor anchor = Anchor::start);
+};
+
+/// An element for a page of html.h, whose style colours it; empty for an empty drawing.
+std::string svg_inline(const Drawing& drawing);
+/// A whole file, black on white.
+std::string svg_file(const Drawing& drawing);
+/// A page of the drawing's size, 0.75 pt a unit. Text is Helvetica, which every reader has; the
+/// file does not hold the font. Letters beyond Windows-1252 become question marks.
+std::string pdf_file(const Drawing& drawing);
+
+/// The characters of UTF-8 text; bytes that are none become U+FFFD.
+std::vector<char32_t> code_points(std::string_view text);
+
+}  // namespace darb
