@@ -9,7 +9,7 @@ set -euo pipefail
 case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 
-readers="ply compressed_ply dot_splat spz sog streamed_sog gltf ksplat splat_file mesh photo colmap transforms checkpoint kernel"
+readers="ply compressed_ply dot_splat spz sog streamed_sog gltf ksplat lcc usda las splat_file mesh photo colmap transforms checkpoint kernel"
 minutes=${1:-10}
 seconds=$(awk -v m="$minutes" 'BEGIN { s = m * 60; print (s < 1 ? 1 : int(s)) }')
 build=build-asan

@@ -11,6 +11,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/data/las_points.h"
 #include "engine/data/point_cloud_ply.h"
 #include "engine/mesh/mesh_file.h"
 #include "engine/scene/splat_file.h"
@@ -109,9 +110,33 @@ void measure_scene(Scene& scene) {
         most_important(scene.model, scene.bounds, std::min(scene.model.size() / 2, kMostMoving));
 }
 
+namespace {
+
+using LoadClock = std::chrono::steady_clock;
+
+Scene finished_scene(Scene scene, const SplatFile& facts, const LoadProgress& progress,
+                     LoadClock::time_point start) {
+    scene.format = scene.is_points ? "point cloud" : std::string(format_name(facts.format));
+    scene.notes = facts.notes;
+    scene.up = facts.up;
+    if (facts.dropped > 0)
+        scene.notes.push_back(
+            scene.is_points
+                ? fmt::format("{} points with NaN, infinity or marked as withheld were dropped.",
+                              facts.dropped)
+                : fmt::format("{} splats with NaN or infinity were dropped.", facts.dropped));
+    if (scene.is_points) scene.notes.emplace_back("Points are shown as opaque balls.");
+    if (progress) progress(0.95, "measuring");
+    measure_scene(scene);
+    scene.load_s = std::chrono::duration<double>(LoadClock::now() - start).count();
+    return scene;
+}
+
+}  // namespace
+
 Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& progress,
                       const StoredUnits& units) {
-    const auto start = std::chrono::steady_clock::now();
+    const LoadClock::time_point start = LoadClock::now();
     Scene scene;
     scene.file = file;
     check_scene_file(file);
@@ -128,19 +153,16 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
             parse_point_cloud_ply(bytes, header, file.string(), facts.dropped, &facts.notes));
     };
     const std::filesystem::path folder = inner.has_parent_path() ? inner.parent_path() : ".";
+    if (looks_like_las(bytes)) {
+        scene.is_points = true;
+        scene.model =
+            points_as_splats(parse_las(bytes, file.string(), facts.dropped, &facts.notes));
+        facts.up = "z";
+        return finished_scene(std::move(scene), facts, progress, start);
+    }
     if (holds_mesh(bytes, inner)) return mesh_scene_of(bytes, folder, std::move(scene), progress);
     scene.model = parse_splats(bytes, inner.string(), &facts, decoding, folder, read_points, units);
-    scene.format = scene.is_points ? "point cloud" : std::string(format_name(facts.format));
-    scene.notes = facts.notes;
-    scene.up = facts.up;
-    if (facts.dropped > 0)
-        scene.notes.push_back(
-            fmt::format("{} splats with NaN or infinity were dropped.", facts.dropped));
-    if (scene.is_points) scene.notes.emplace_back("Points are shown as opaque balls.");
-    if (progress) progress(0.95, "measuring");
-    measure_scene(scene);
-    scene.load_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return scene;
+    return finished_scene(std::move(scene), facts, progress, start);
 }
 
 LoadJob::LoadJob(std::filesystem::path file, std::function<void()> wake, const StoredUnits& units)

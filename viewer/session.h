@@ -14,6 +14,7 @@
 
 #include "engine/gpu/commands.h"
 #include "engine/plan/effect_plan.h"
+#include "engine/scene/region.h"
 #include "viewer/camera_path.h"
 #include "viewer/display.h"
 #include "viewer/edit.h"

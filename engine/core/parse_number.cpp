@@ -9,6 +9,11 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "engine/core/error.h"
 
 namespace darb {
 
@@ -72,6 +77,29 @@ std::from_chars_result double_by_strtod(const char* first, const char* last, dou
         return {end, std::errc::result_out_of_range};
     value = number;
     return {end, std::errc()};
+}
+
+std::optional<std::vector<double>> number_list(std::string_view text) {
+    std::vector<double> values;
+    const char *at = text.data(), *const end = at + text.size();
+    while (at <= end) {
+        double value = 0;
+        const auto [rest, error] = parse_number(at, end, value);
+        if (error != std::errc{} || !std::isfinite(value) || (rest != end && *rest != ','))
+            return std::nullopt;
+        values.push_back(value);
+        at = rest + 1;
+    }
+    return values;
+}
+
+std::vector<double> numbers_from(const std::string& option, const std::string& text,
+                                 std::size_t count) {
+    std::optional<std::vector<double>> values = number_list(text);
+    if (!values || values->size() != count)
+        throw Error(option, fmt::format("'{}' is not {} numbers", text, count),
+                    "Write them with commas and without spaces.");
+    return std::move(*values);
 }
 
 }  // namespace darb

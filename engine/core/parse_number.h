@@ -4,7 +4,12 @@
 #pragma once
 
 #include <charconv>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <type_traits>
+#include <vector>
 
 namespace darb {
 
@@ -24,5 +29,12 @@ std::from_chars_result parse_number(const char* first, const char* last, T& valu
 #endif
         return std::from_chars(first, last, value);
 }
+
+/// The finite numbers of a text, with commas between them and without spaces; nothing where the
+/// text is something else.
+std::optional<std::vector<double>> number_list(std::string_view text);
+/// `count` such numbers. Throws Error naming the option.
+std::vector<double> numbers_from(const std::string& option, const std::string& text,
+                                 std::size_t count);
 
 }  // namespace darb

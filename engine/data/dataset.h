@@ -179,4 +179,9 @@ struct WatchedBox {
 /// as the photos show there; where the axes are parallel, the bounding box of the cameras.
 WatchedBox region_in_view(const Dataset& dataset);
 
+/// Takes the points of a PLY or LAS file in place of the data set's, with a note; which photos saw
+/// the former is forgotten. Throws Error naming the file where it has none, or where no camera has
+/// any of them in its picture.
+void replace_points(const std::filesystem::path& file, Dataset& dataset);
+
 }  // namespace darb

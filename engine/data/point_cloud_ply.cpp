@@ -9,6 +9,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/data/las_points.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/ply_table.h"
 #include "engine/scene/quantise.h"
@@ -119,6 +120,14 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeade
 PointCloud read_point_cloud_ply(const std::filesystem::path& path, std::size_t& dropped,
                                 std::vector<std::string>* notes) {
     const std::vector<std::byte> file = read_file(path);
+    return parse_point_cloud_ply(file, parse_ply_header(file, path.string()), path.string(),
+                                 dropped, notes);
+}
+
+PointCloud read_point_cloud(const std::filesystem::path& path, std::size_t& dropped,
+                            std::vector<std::string>* notes) {
+    const std::vector<std::byte> file = read_file(path);
+    if (looks_like_las(file)) return parse_las(file, path.string(), dropped, notes);
     return parse_point_cloud_ply(file, parse_ply_header(file, path.string()), path.string(),
                                  dropped, notes);
 }

@@ -26,6 +26,10 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeade
 PointCloud read_point_cloud_ply(const std::filesystem::path& path, std::size_t& dropped,
                                 std::vector<std::string>* notes = nullptr);
 
+/// A PLY or LAS file, told apart by content.
+PointCloud read_point_cloud(const std::filesystem::path& path, std::size_t& dropped,
+                            std::vector<std::string>* notes = nullptr);
+
 // Point clouds as splats: this is how a viewer opens a plain point-cloud PLY.
 
 /// Mean squared distance of each point to its 3 nearest neighbours (fewer where there are no more

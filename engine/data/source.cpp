@@ -623,4 +623,29 @@ void note_odd_cameras(Dataset& dataset) {
             counted(blind.count, "camera"), dataset.views.size(), blind.example->name));
 }
 
+void replace_points(const fs::path& file, Dataset& dataset) {
+    std::size_t dropped = 0;
+    const std::size_t own = dataset.points.size();
+    dataset.points = read_point_cloud(file, dropped, &dataset.notes);
+    const PointCloud& points = dataset.points;
+    if (points.size() == 0)
+        throw Error(file.string(), "has no points to start from", "Name another file.");
+    const std::size_t step = points.size() / kLooked + 1;
+    if (std::ranges::none_of(dataset.views, [&](const View& view) {
+            return sees_a_point(view.camera, points, step);
+        }))
+        throw Error(
+            file.string(),
+            fmt::format("none of its {} points is in the picture of any camera", points.size()),
+            "Name points in the coordinates of the data set's cameras.");
+    dataset.notes.push_back(
+        fmt::format("Training starts from {} of {}, in place of the data set's "
+                    "{}.",
+                    counted(points.size(), "point"), file.string(), own));
+    if (dropped > 0)
+        dataset.notes.push_back(
+            fmt::format("{} with NaN, infinity or marked as withheld were dropped.",
+                        counted(dropped, "point")));
+}
+
 }  // namespace darb

@@ -931,7 +931,7 @@ void add_points(const fs::path& root, const std::string& ply, const DatasetOptio
         return;
     }
     std::size_t dropped = 0;
-    dataset.points = read_point_cloud_ply(path, dropped, &dataset.notes);
+    dataset.points = read_point_cloud(path, dropped, &dataset.notes);
     if (ply.empty())
         dataset.notes.push_back(fmt::format("{} with the sparse points was read: {}.",
                                             path.filename().string(),

@@ -77,8 +77,43 @@ bool looks_like_dot_splat(std::span<const std::byte> file) {
     return true;
 }
 
+namespace {
+
+constexpr std::size_t kLeastInPhase = 32;  // records: fewer are not judged
+
+/// The share of records whose rotation has length 1, where records begin at this byte.
+double share_in_phase(std::span<const std::byte> file, std::size_t first) {
+    const std::size_t records = (file.size() - first) / kRecord,
+                      step = std::max<std::size_t>(1, records / kProbed);
+    std::size_t looked = 0, unit = 0;
+    for (std::size_t i = 0; i < records; i += step, ++looked) {
+        float square = 0;
+        for (const float part : rotation_of_record(file.subspan(first + i * kRecord, kRecord)))
+            square += part * part;
+        unit += std::abs(std::sqrt(square) - 1) <= kNormSlack ? 1 : 0;
+    }
+    return static_cast<double>(unit) / static_cast<double>(std::max<std::size_t>(looked, 1));
+}
+
+/// Refuses a file whose beginning is missing: its rotations have length 1 in another place of each
+/// record. Of bytes at random every eighth has.
+void check_phase(std::span<const std::byte> file, const std::string& where) {
+    constexpr double kFew = 0.5, kNearlyAll = 0.95;
+    if (file.size() / kRecord < kLeastInPhase || share_in_phase(file, 0) > kFew) return;
+    for (std::size_t first = 1; first < kRecord; ++first)
+        if (share_in_phase(file, first) > kNearlyAll)
+            throw Error(where,
+                        fmt::format("has records of 32 bytes that begin at byte {}, not at 0: "
+                                    "what stood before them is missing",
+                                    first),
+                        "Copy or export the file again, from its beginning.");
+}
+
+}  // namespace
+
 SplatModel parse_dot_splat(std::span<const std::byte> file, const std::string& where,
                            std::size_t* dropped, bool logarithms) {
+    check_phase(file, where);
     if (file.size() % kRecord != 0)
         throw Error(
             where,

@@ -183,13 +183,6 @@ bool has_rotation(const SplatModel& model, std::size_t splat) {
     return square > ROTATION_MIN_SQUARE;
 }
 
-bool Region::contains(const glm::dvec3& p) const {
-    const glm::dvec3 d = p - centre;
-    if (shape == Shape::sphere) return glm::dot(d, d) <= half_size.x * half_size.x;
-    return std::abs(d.x) <= half_size.x && std::abs(d.y) <= half_size.y &&
-           std::abs(d.z) <= half_size.z;
-}
-
 std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatModel& model) {
     return keep_splats(
         [&](std::size_t i) {

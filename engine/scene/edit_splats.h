@@ -53,14 +53,6 @@ bool is_finite(const SplatModel& model, std::size_t splat);
 std::size_t drop_non_finite(SplatModel& model);
 /// Whether a splat's rotation has a positive length; splats without one are never drawn.
 bool has_rotation(const SplatModel& model, std::size_t splat);
-/// A box along the world's axes, or a sphere.
-struct Region {
-    enum class Shape { box, sphere };
-    Shape shape = Shape::box;
-    glm::dvec3 centre{0.0};     // world
-    glm::dvec3 half_size{1.0};  // world; for a sphere x is the radius
-    bool contains(const glm::dvec3& p) const;
-};
 
 /// Drops splats whose centre is outside the box, given in world units.
 std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatModel& model);

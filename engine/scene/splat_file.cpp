@@ -107,6 +107,22 @@ bool starts_with(std::span<const std::byte> bytes, std::string_view text) {
                       [](char c, std::byte b) { return std::byte(c) == b; });
 }
 
+std::size_t level_to_read(const SplatSource& source, std::size_t levels) {
+    const std::size_t level = source.units.level.value_or(0);
+    if (level >= levels)
+        throw Error(
+            source.where,
+            fmt::format("has {} of detail, no level {}",
+                        levels == 1 ? "one level" : fmt::format("{} levels", levels), level),
+            fmt::format("Use --lod 0, the finest{}, or leave it out.",
+                        levels > 1 ? fmt::format(", to {}", levels - 1) : ""));
+    return level;
+}
+
+std::string level_note(std::size_t levels) {
+    return fmt::format("the finest level is read; --lod 1 to {} reads a coarser one", levels - 1);
+}
+
 std::string_view format_name(SplatFormat format) {
     return row_of(format).name;
 }
@@ -144,6 +160,12 @@ SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& whe
         const SplatFormatRow& row = row_of(format);
         if (!row.recognise || !row.recognise(source)) continue;
         facts.format = format;
+        if (units.level && !row.has_levels)
+            throw Error(where,
+                        fmt::format("is {}, which has no levels of detail, and --lod {} asks "
+                                    "for one",
+                                    row.name, *units.level),
+                        "Leave --lod out.");
         SplatModel model = row.parse(source, facts);
         if (!are_points) settle_units(units, where, facts, model);
         return model;

@@ -27,9 +27,11 @@
     ROW(ply)                    \
     ROW(compressed_ply)         \
     ROW(spz)                    \
+    ROW(lcc)                    \
     ROW(gltf)                   \
     ROW(streamed_sog)           \
     ROW(sog)                    \
+    ROW(usda)                   \
     ROW(ksplat)                 \
     ROW(dot_splat)
 

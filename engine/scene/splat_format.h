@@ -49,7 +49,8 @@ struct SplatFormatRow {
     /// null: the format cannot be written. The model has been through drop_unwritable.
     EncodedSplats (*encode)(const SplatModel&, const std::string& where,
                             const EncodeOptions&) = nullptr;
-    unsigned keeps = 0;  // SplatFeature
+    unsigned keeps = 0;       // SplatFeature
+    bool has_levels = false;  // of detail: StoredUnits::level chooses one
     /// What exceeds the format's ranges, one sentence each; null: nothing can. Throws as encode
     /// does.
     std::vector<std::string> (*cuts)(const SplatModel&, const std::string& where) = nullptr;
@@ -60,6 +61,12 @@ struct SplatFormatRow {
 #define DARB_SPLAT_FORMAT(name) const SplatFormatRow& name##_format();
 DARB_SPLAT_FORMATS(DARB_SPLAT_FORMAT)
 #undef DARB_SPLAT_FORMAT
+
+/// The level of detail to read of a file that has so many. Throws Error where it has not the one
+/// that was asked for.
+std::size_t level_to_read(const SplatSource& source, std::size_t levels);
+/// For SplatFile::notes, where the finest of several levels is read and nobody asked for one.
+std::string level_note(std::size_t levels);
 
 /// Whether the bytes begin with `text`.
 bool starts_with(std::span<const std::byte> bytes, std::string_view text);

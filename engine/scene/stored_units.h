@@ -5,6 +5,8 @@
 // detects from all values of a scene that they may need it.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,13 +20,15 @@ enum class StoredColours { harmonics, rgb, bytes };     // rgb: 0 to 1; bytes: 0
 enum class StoredRotations { wxyz, xyzw };
 enum class StoredOrder { usual, swapped };
 
-/// What the user says about a file.
+/// What the user says about a file, and what of it to read.
 struct StoredUnits {
     StoredScales scales{};
     StoredOpacities opacities{};
     StoredColours colours{};
     StoredRotations rotations{};
     StoredOrder harmonics{};
+    /// The level of detail to read of a format that has levels, 0 being the finest; absent: 0.
+    std::optional<std::size_t> level = {};
     bool operator==(const StoredUnits&) const = default;
 };
 

@@ -159,6 +159,8 @@ SplatModel load_level(const SplatSource& source, SplatFile& file,
     if (source.folder.empty())
         throw Error(source.where, "describes a streamed SOG scene, whose files are not here",
                     "Name its lod-meta.json, or its folder.");
+    const std::size_t levels = lod_number(meta, "lodLevels");
+    if (!wanted && source.units.level) wanted = level_to_read(source, levels);
     const std::vector<LodRange> ranges = ranges_of(meta.at("tree"), wanted);
     const std::map<std::size_t, SplatModel> chunks = read_chunks_of(meta, source, ranges, file);
     SplatModel model;
@@ -178,10 +180,9 @@ SplatModel load_level(const SplatSource& source, SplatFile& file,
         append_rows(chunk, range.offset, range.count, model, positions);
     }
     set_positions(positions, model);
-    const std::size_t levels = lod_number(meta, "lodLevels");
     file.details = fmt::format("{} levels, {} files", levels, meta.at("filenames").size());
-    if (levels > 1 && !wanted)
-        file.notes.push_back("the finest level is read, coarser ones are left out");
+    if (wanted) file.details += fmt::format(", level {}", *wanted);
+    if (levels > 1 && !wanted) file.notes.push_back(level_note(levels));
     return model;
 } catch (const json::parse_error& error) {
     throw Error(
@@ -380,7 +381,8 @@ const SplatFormatRow& streamed_sog_format() {
                                         },
                                     .parse = load_streamed,
                                     .encode = encode_streamed,
-                                    .keeps = kKeepsRenderMode | kKeepsHarmonics | kKeepsUnit};
+                                    .keeps = kKeepsRenderMode | kKeepsHarmonics | kKeepsUnit,
+                                    .has_levels = true};
     return row;
 }
 

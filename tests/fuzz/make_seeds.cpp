@@ -24,6 +24,8 @@
 #include "engine/scene/splat_file.h"
 #include "engine/scene/spz.h"
 #include "tests/support/ksplat_file.h"
+#include "tests/support/las_file.h"
+#include "tests/support/lcc_files.h"
 #include "tests/support/mesh_shapes.h"
 #include "tests/support/photo_files.h"
 #include "tests/support/test_scene.h"
@@ -214,6 +216,17 @@ void make_scenes(const fs::path& corpus) {
     radial.kernel = KERNEL_RAISED_COSINE;
     add_scene(corpus, "gltf", "radial", encode_splats(SplatFormat::gltf, radial));
     add_scene(corpus, "gltf", "data_uri.gltf", bytes_of(gltf_text()));
+    add_scene(corpus, "usda", "scene", encode_splats(SplatFormat::usda, sample_model(1)));
+    write_file_atomic(corpus / "las/points",
+                      las_file({{{1, 2, 3}, {9, 8, 7}}}, {.minor = 4, .format = 7}));
+    for (const bool harmonics : {false, true}) {
+        const LccScene scene = lcc_scene({}, harmonics);
+        FileBytes seed{std::byte(scene.index.size())};
+        seed.insert(seed.end(), scene.index.begin(), scene.index.end());
+        const FileBytes meta = bytes_of(scene.meta.dump());
+        seed.insert(seed.end(), meta.begin(), meta.end());
+        write_file_atomic(corpus / "lcc" / (harmonics ? "quality" : "portable"), seed);
+    }
     write_file_atomic(corpus / "streamed_sog" / "one_file",
                       encode_scene(SplatFormat::streamed_sog, sample_model(0)).file);
     for (const int level : {0, 1, 2})

@@ -51,7 +51,8 @@ struct Population {
     /// Moments are 1, 2, 3, ..., so that each can be recognised.
     Generation run(const gpu::DensifyArgs& args, DensityResult& result,
                    int kernel = KERNEL_GAUSSIAN, std::uint32_t max_splats = kNoLimit,
-                   Footprint footprint = Footprint::psi) const {
+                   Footprint footprint = Footprint::psi,
+                   std::span<const std::uint8_t> fixed = {}) const {
         Device& device = shared_device();
         GpuSplats splats(device, model, true, true);
         for (int a = 0; a < kAttributeCount; ++a) splats.upload_moments(a, moments_before(a));
@@ -60,7 +61,7 @@ struct Population {
         Buffer sums(device, "gradient sum", std::max<size_t>(model.size(), 1) * 8);
         if (!gradient_sum.empty()) sums.upload(gradient_sum);
         DensityControl density(device, kernel, footprint);
-        result = density.run(splats, sums, args, max_splats);
+        result = density.run(splats, sums, args, max_splats, fixed);
         Generation g{splats.download(), {}, {}};
         const size_t rest = g.model.size() * stride(kShRest);
         if (rest > 0) g.rest_sum = splats.download_rest_sum();
@@ -192,6 +193,26 @@ TEST(Densify, growth_stops_at_the_limit_largest_gradients_first) {
         EXPECT_EQ(result.after, reference::count_after(actions));
         expect_generation(population, sources_of(actions), after);
     }
+}
+
+TEST(Densify, fixed_splats_are_pruned_and_do_not_grow) {
+    const Population population(1000);
+    const reference::DensitySettings settings;
+    std::vector<std::uint8_t> fixed(1000);
+    std::vector<DensityAction> actions = population.actions(settings);
+    std::size_t stopped = 0;
+    for (std::size_t i = 0; i < fixed.size(); ++i) {
+        fixed[i] = i % 3 == 0 ? 1 : 0;
+        if (fixed[i] == 0 || actions[i] == DensityAction::remove) continue;
+        stopped += actions[i] == DensityAction::keep ? 0 : 1;
+        actions[i] = DensityAction::keep;
+    }
+    ASSERT_GT(stopped, 10U);
+    DensityResult result;
+    const Generation after = population.run(args_for(settings), result, KERNEL_GAUSSIAN, kNoLimit,
+                                            Footprint::psi, fixed);
+    EXPECT_EQ(result.after, reference::count_after(actions));
+    expect_generation(population, sources_of(actions), after);
 }
 
 TEST(Densify, pruning_everything_leaves_an_empty_model) {

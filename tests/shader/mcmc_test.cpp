@@ -231,7 +231,8 @@ struct Round {
 };
 
 /// Moments are 1 before.
-Round run_round(const SplatModel& model, std::uint32_t grown, std::uint32_t seed = 5) {
+Round run_round(const SplatModel& model, std::uint32_t grown, std::uint32_t seed = 5,
+                std::span<const std::uint8_t> fixed = {}) {
     Device& d = shared_device();
     GpuSplats splats(d, model, true);
     for (int a = 0; a < kAttributeCount; ++a)
@@ -239,10 +240,30 @@ Round run_round(const SplatModel& model, std::uint32_t grown, std::uint32_t seed
     DensityControl density(d, model.kernel);
     Relocation relocation(d, model.kernel, model.footprint);
     Round round;
-    round.result = relocation.run(splats, density, kDead, grown, seed);
+    round.result = relocation.run(splats, density, {kDead, grown, seed, fixed});
     round.model = splats.download();
     for (int a = 0; a < kAttributeCount; ++a) round.moments[a] = splats.download_moments(a);
     return round;
+}
+
+TEST(Relocation, nothing_moves_onto_fixed_splats) {
+    SplatModel model = population(400);
+    std::vector<std::uint8_t> fixed(model.size());
+    for (std::size_t i = 0; i < fixed.size(); ++i) {
+        fixed[i] = i % 2 == 0 ? 1 : 0;
+        model.position[3 * i] = fixed[i] != 0 ? -1.0f : 1.0f;  // fixed ones lie on one side
+        model.opacity_logit[i] = i % 5 == 0 ? -8.0f : 0.0f;    // of both, some are dead
+    }
+    const Round after = run_round(model, 100, 5, fixed);
+    ASSERT_EQ(after.model.size(), 500U);
+    EXPECT_EQ(after.result.pruned, 80U);
+    for (std::size_t i = 0; i < 500; ++i) {
+        const bool was_fixed_and_lives = i < 400 && fixed[i] != 0 && i % 5 != 0;
+        EXPECT_EQ(after.model.position[3 * i], was_fixed_and_lives ? -1.0f : 1.0f) << i;
+        if (was_fixed_and_lives) {
+            EXPECT_EQ(after.model.opacity_logit[i], 0.0f) << i;
+        }
+    }
 }
 
 // Opacities of exactly 1/2, so that the weights are those of the reference to the bit.

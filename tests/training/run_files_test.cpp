@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/point_cloud_ply.h"
+#include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/run_command.h"
 #include "trainer/step/checkpoint.h"
@@ -149,6 +150,61 @@ TEST_F(RunFiles, what_is_too_transparent_to_be_drawn_is_not_saved) {
     EXPECT_NE(o.out.find(fmt::format("drawn {} were left out, and 0 had left", undrawn)),
               std::string::npos)
         << o.out;
+}
+
+/// Kept after all: splats in a sphere, and what a run of these options saves.
+struct Regional {
+    std::size_t inside = 0, outside = 0;
+};
+Regional counted_by(const fs::path& run, int iteration, const glm::dvec3& centre, double radius) {
+    const SplatModel m = load_splats(run / "point_cloud" / fmt::format("iteration_{}", iteration) /
+                                     "point_cloud.ply");
+    Regional counts;
+    for (std::size_t i = 0; i < m.size(); ++i)
+        ++(glm::distance(position_of(m, i), centre) <= radius ? counts.inside : counts.outside);
+    return counts;
+}
+
+// The threshold of 0 lets every splat grow that a frame has seen.
+TEST_F(RunFiles, a_region_grows_alone_and_what_is_outside_of_it_may_go) {
+    const std::string options = fmt::format(
+        "train '{}' -o '{}' -r 8 --iterations 8 --eval --densify-from-iter 1 "
+        "--densification-interval 2 --densify-until-iter 7 --densify-grad-threshold 0 "
+        "--save-iterations 1 --opacity-reg 0 --scale-reg 0 --clearance 0 -q ",
+        data().string(), run().string());
+    const glm::dvec3 centre(0, 0, 0);
+    constexpr double kRadius = 1.2;
+    const auto trained = [&](const std::string& more) {
+        const Outcome o = darb(options + more);
+        ASSERT_EQ(o.code, 0) << o.err;
+    };
+    trained("");
+    const Regional start = counted_by(run(), 1, centre, kRadius);
+    const Regional everywhere = counted_by(run(), 8, centre, kRadius);
+    ASSERT_GT(start.outside, 50u);
+    ASSERT_GT(everywhere.outside, start.outside + 20);
+    trained("--roi sphere:0,0,0,1.2");
+    const Regional alone = counted_by(run(), 8, centre, kRadius);
+    EXPECT_LE(alone.outside, start.outside + 5) << "a few may move across its border";
+    EXPECT_GT(alone.inside, start.inside + 20);
+    EXPECT_EQ(read_json(run() / "request.json").at("roi"), "sphere:0,0,0,1.2");
+    trained("--roi sphere:0,0,0,1.2 --drop-outside --clean-haze 0.2,1.5");
+    const Regional cut = counted_by(run(), 8, centre, kRadius);
+    EXPECT_EQ(cut.outside, 0u);
+    EXPECT_LT(cut.inside, alone.inside) << "haze went as well";
+    EXPECT_GT(cut.inside, 0u);
+    const std::string log = read_text_file(run() / "run.jsonl");
+    const std::size_t at = log.find("\"event\":\"cleaned\"");
+    ASSERT_NE(at, std::string::npos);
+    const std::size_t begin = log.rfind('\n', at) + 1;
+    const json cleaned = json::parse(log.substr(begin, log.find('\n', at) - begin));
+    ASSERT_EQ(cleaned.at("rules").size(), 3u);
+    EXPECT_EQ(cleaned.at("rules")[0].at("splats"), alone.outside);
+    EXPECT_GT(cleaned.at("rules")[2].at("light_share"), 0.0);
+    EXPECT_LT(cleaned.at("psnr_after"), cleaned.at("psnr_before"));
+    expect_input_error(darb(options + "--roi sphere:500,0,0,1"), {"--roi", "points lies in it"});
+    expect_input_error(darb(options + "--roi cube:1"), {"--roi cube:1", "is no region"});
+    expect_input_error(darb(options + "--clean-haze 3,1"), {"--clean-haze", "0 to 1"});
 }
 
 // Splats without rates gain nothing; the look after iteration 3 says so, which ends the run.

@@ -3,12 +3,10 @@
 // photos show, and says what each of these costs.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,11 +19,12 @@
 #include "engine/gpu/device.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/publish/fit_pictures.h"
+#include "engine/render/cleaning.h"
 #include "engine/render/free_space.h"
-#include "engine/render/light_share.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/clutter.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/region.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/subject.h"
 #include "tools/darb/command_list.h"
@@ -41,7 +40,6 @@ namespace darb {
 namespace {
 
 constexpr double kIsolatedShare = 0.01;  // of the heaviest part, where no rule is named
-constexpr int kLightWidth = 480;         // px, of the pictures whose light is measured
 
 struct CleanFlags {
     std::filesystem::path scene, photos, cameras, output, json, paper;
@@ -53,13 +51,6 @@ struct CleanFlags {
     DatasetOptions data;
     StoredUnits units;
     TuneFlags tune;
-};
-
-/// What one rule leaves out.
-struct Rule {
-    std::string name;
-    SplatSet set;
-    double light = 0;  // share of all pictures' light, 0 to 1
 };
 
 struct Cameras {
@@ -78,134 +69,33 @@ Cameras chosen_cameras(const CleanFlags& flags, const SplatModel& model,
     return {evenly_chosen(cameras_of(views)), true};
 }
 
-Region region_from(const std::string& text, const SplatModel& model, const Cameras& cameras) {
-    constexpr double kRoom = 1.25;  // around the subject
-    const std::string::size_type colon = text.find(':');
-    const std::string kind = text.substr(0, colon);
-    const std::string rest = colon == std::string::npos ? "" : text.substr(colon + 1);
-    Region region;
-    if (kind == "subject") {
-        const Subject subject =
-            subject_of(model, cameras.of_photos ? std::span<const Camera>(cameras.cameras)
-                                                : std::span<const Camera>());
-        if (subject.around)
-            throw Error("--region " + text, "the cameras look outwards, at no subject",
-                        "Give a box or a sphere.");
-        const double factor = rest.empty() ? kRoom : numbers_from("--region subject", rest, 1)[0];
-        region = {Region::Shape::sphere, subject.centre, glm::dvec3(factor * subject.radius)};
-    } else if (kind == "sphere") {
-        const std::vector<double> n = numbers_from("--region sphere", rest, 4);
-        region = {Region::Shape::sphere, {n[0], n[1], n[2]}, glm::dvec3(n[3])};
-    } else if (kind == "box") {
-        const std::vector<double> n = numbers_from("--region box", rest, 6);
-        const glm::dvec3 low(n[0], n[1], n[2]), high(n[3], n[4], n[5]);
-        region = {Region::Shape::box, (low + high) / 2.0, (high - low) / 2.0};
-    } else {
-        throw Error("--region " + text, "is no region",
-                    "Give subject, subject:1.5 (times its radius), sphere:X,Y,Z,RADIUS or "
-                    "box:MINX,MINY,MINZ,MAXX,MAXY,MAXZ.");
-    }
-    if (!glm::all(glm::greaterThan(region.half_size, glm::dvec3(0))))
-        throw Error("--region " + text, "holds nothing",
-                    "Sizes must be above 0, and each least number below its largest.");
-    return region;
+CleaningRules rules_from(const CleanFlags& flags, const SplatModel& model, const Cameras& cameras) {
+    CleaningRules rules;
+    rules.free_space = flags.free_space;
+    rules.few_views = flags.few_views;
+    if (!flags.haze.empty()) take_haze("--haze", flags.haze, rules);
+    if (!flags.region.empty())
+        rules.region = region_from("--region", flags.region, model,
+                                   cameras.of_photos ? std::span<const Camera>(cameras.cameras)
+                                                     : std::span<const Camera>());
+    rules.isolated = flags.isolated.value_or(rules.any() ? 0.0 : kIsolatedShare);
+    return rules;
 }
 
-class Cleaning {
-  public:
-    Cleaning(const CleanFlags& flags, Device& device, const SplatModel& model,
-             const Cameras& cameras)
-        : flags_(flags), device_(device), model_(model), cameras_(cameras) {}
-
-    std::vector<Rule> rules() {
-        add_from_splats();
-        add_from_views();
-        for (Rule& rule : rules_) rule.light = light_of(rule.set);
-        return std::move(rules_);
+/// Draws the scene with the effects that it calls for, without lenses.
+std::unique_ptr<Renderer> plain_renderer(Device& device, SplatModel model, const Cameras& cameras) {
+    std::vector<View> views;
+    for (const Camera& camera : cameras.cameras) {
+        views.emplace_back().camera = camera;
+        views.back().camera.lens = {};
     }
-    /// Mean over the cameras.
-    double light_of(const SplatSet& set) const {
-        if (count_of(set) == 0) return 0;
-        const std::vector<double> shares = light_shares(device_, model_, set, small_pictures());
-        return std::accumulate(shares.begin(), shares.end(), 0.0) / double(shares.size());
-    }
-
-  private:
-    bool nothing_named() const {
-        return !flags_.isolated && flags_.haze.empty() && flags_.free_space == 0 &&
-               flags_.few_views == 0 && flags_.region.empty();
-    }
-
-    std::vector<Camera> small_pictures() const {
-        std::vector<Camera> small;
-        for (const Camera& camera : cameras_.cameras)
-            small.push_back(pinhole_at_most(camera, kLightWidth));
-        return small;
-    }
-
-    void add_from_splats() {
-        const double isolated = flags_.isolated.value_or(nothing_named() ? kIsolatedShare : 0.0);
-        if (!flags_.region.empty()) {
-            const Region region = region_from(flags_.region, model_, cameras_);
-            SplatSet outside(model_.size());
-            for (std::size_t i = 0; i < outside.size(); ++i)
-                outside[i] = region.contains(position_of(model_, i)) ? 0 : 1;
-            rules_.push_back({"outside the region", std::move(outside)});
-        }
-        if (isolated > 0) rules_.push_back({"isolated parts", isolated_splats(model_, isolated)});
-        if (!flags_.haze.empty()) {
-            const std::vector<double> haze = numbers_from("--haze", flags_.haze, 2);
-            if (!(haze[0] >= 0 && haze[0] <= 1 && haze[1] > 0))
-                throw Error("--haze " + flags_.haze, "is not an opacity and a size",
-                            "Give an opacity of 0 to 1 and how many times the median size, as "
-                            "--haze 0.1,5.");
-            rules_.push_back({"haze", hazy_splats(model_, haze[0], haze[1])});
-        }
-    }
-
-    void add_from_views() {
-        if (flags_.free_space > 0) {
-            EffectPlan plan;
-            SplatModel model = model_;
-            Renderer renderer = plain_renderer(model, plan);
-            FreeSpaceOptions options;
-            options.least_views = flags_.free_space;
-            FreeSpace space(model_, options);
-            SlowProgress progress("free space");
-            for (std::size_t v = 0; v < cameras_.cameras.size(); ++v) {
-                progress.at(double(v) / double(cameras_.cameras.size()));
-                space.ask(renderer, cameras_.cameras[v]);
-            }
-            rules_.push_back({"in free space", space.splats()});
-        }
-        if (flags_.few_views > 0) {
-            const std::vector<std::uint32_t> views =
-                views_that_see(device_, model_, small_pictures());
-            SplatSet few(model_.size());
-            for (std::size_t i = 0; i < few.size(); ++i)
-                few[i] = views[i] > 0 && views[i] < flags_.few_views ? 1 : 0;
-            rules_.push_back({"seen by few", std::move(few)});
-        }
-    }
-
-    Renderer plain_renderer(SplatModel& model, EffectPlan& plan) const {
-        std::vector<View> views;
-        for (const Camera& camera : cameras_.cameras) {
-            views.emplace_back().camera = camera;
-            views.back().camera.lens = {};
-        }
-        DatasetOptions none;
-        plan = plan_rendering(model, views, {}, choose_effects("auto", EffectUse::pictures, none));
-        apply_plan(plan, model);
-        return {device_, model, Accuracy{}, plan.projection(), plan.huge_splat_path()};
-    }
-
-    const CleanFlags& flags_;
-    Device& device_;
-    const SplatModel& model_;
-    const Cameras& cameras_;
-    std::vector<Rule> rules_;
-};
+    DatasetOptions none;
+    const EffectPlan plan =
+        plan_rendering(model, views, {}, choose_effects("auto", EffectUse::pictures, none));
+    apply_plan(plan, model);
+    return std::make_unique<Renderer>(device, model, Accuracy{}, plan.projection(),
+                                      plan.huge_splat_path());
+}
 
 /// PSNR of the held-out photos before and after.
 struct Judgement {
@@ -229,16 +119,16 @@ std::optional<Judgement> judge(Device& device, const Dataset& photos, const Effe
     return judged;
 }
 
-nlohmann::json report_json(const CleanFlags& flags, const std::vector<Rule>& rules,
-                           const Rule& together, const std::optional<Judgement>& judged) {
+nlohmann::json report_json(const CleanFlags& flags, const Clutter& clutter,
+                           const std::optional<Judgement>& judged) {
     nlohmann::json json{{"output", flags.dry_run ? "" : name_in_json(flags.json, flags.output)},
-                        {"splats", together.set.size()}};
-    const auto row = [](const Rule& rule) {
+                        {"splats", clutter.together.set.size()}};
+    const auto row = [](const ClutterOfRule& rule) {
         return nlohmann::json{
-            {"rule", rule.name}, {"splats", count_of(rule.set)}, {"light_share", rule.light}};
+            {"rule", rule.rule}, {"splats", count_of(rule.set)}, {"light_share", rule.light}};
     };
-    for (const Rule& rule : rules) json["rules"].push_back(row(rule));
-    json["together"] = row(together);
+    for (const ClutterOfRule& rule : clutter.rules) json["rules"].push_back(row(rule));
+    json["together"] = row(clutter.together);
     if (judged)
         json["held_out"] = {{"views", judged->views},
                             {"psnr_before", judged->before},
@@ -246,21 +136,20 @@ nlohmann::json report_json(const CleanFlags& flags, const std::vector<Rule>& rul
     return json;
 }
 
-void tell_report(std::FILE* out, const std::vector<Rule>& rules, const Rule& together,
-                 const std::optional<Judgement>& judged) {
-    const auto row = [&](const Rule& rule) {
+void tell_report(std::FILE* out, const Clutter& clutter, const std::optional<Judgement>& judged) {
+    const auto row = [&](const ClutterOfRule& rule) {
         const std::size_t count = count_of(rule.set);
-        tell(out, "{:<19}{:>9} splats ({:.1f} %), {:.2f} % of the light\n", rule.name, count,
+        tell(out, "{:<19}{:>9} splats ({:.1f} %), {:.2f} % of the light\n", rule.rule, count,
              100 * double(count) / double(rule.set.size()), 100 * rule.light);
     };
-    for (const Rule& rule : rules) row(rule);
-    if (rules.size() > 1) row(together);
+    for (const ClutterOfRule& rule : clutter.rules) row(rule);
+    if (clutter.rules.size() > 1) row(clutter.together);
     if (judged)
         tell(out, "{} held-out photos: {:.2f} dB before, {:.2f} dB after\n", judged->views,
              judged->before, judged->after);
 }
 
-Report paper_report(const CleanFlags& flags, const std::vector<Rule>& rules, const Rule& together,
+Report paper_report(const CleanFlags& flags, const Clutter& clutter,
                     const std::optional<Judgement>& judged) {
     Report report("Cleaning", name_in_json(flags.paper, flags.scene));
     Table table{"rules", "What each rule leaves out", "", {}, {}};
@@ -268,13 +157,13 @@ Report paper_report(const CleanFlags& flags, const std::vector<Rule>& rules, con
                      {"splats", "", Better::neither, 0},
                      {"of the splats", "%", Better::neither, 1},
                      {"of the light", "%"}};
-    const auto add = [&](const Rule& rule, bool ranked) {
+    const auto add = [&](const ClutterOfRule& rule, bool ranked) {
         const double count = double(count_of(rule.set));
         table.rows.push_back(
             {{rule.name, count, 100 * count / double(rule.set.size()), 100 * rule.light}, ranked});
     };
-    for (const Rule& rule : rules) add(rule, true);
-    if (rules.size() > 1) add(together, false);
+    for (const ClutterOfRule& rule : clutter.rules) add(rule, true);
+    if (clutter.rules.size() > 1) add(clutter.together, false);
     report.table(std::move(table));
     if (!judged) return report;
     Table photos{"held out",
@@ -342,24 +231,24 @@ int clean(CleanFlags flags) {
                     "Name them with --cameras, or the photos themselves with --photos.");
     Device device(command_device(flags.device));
     settle_tuning(device, flags.tune);
-    Cleaning cleaning(flags, device, model, cameras);
-    const std::vector<Rule> rules = cleaning.rules();
-    Rule all{"together", SplatSet(model.size(), 0)};
-    for (const Rule& rule : rules)
-        for (std::size_t i = 0; i < all.set.size(); ++i) all.set[i] |= rule.set[i];
-    all.light = rules.size() == 1 ? rules[0].light : cleaning.light_of(all.set);
-    if (count_of(all.set) == model.size())
+    SlowProgress progress("free space");
+    const Clutter clutter = find_clutter(
+        device, model, cameras.cameras, rules_from(flags, model, cameras),
+        [&] { return plain_renderer(device, model, cameras); },
+        [&](double share) { progress.at(share); });
+    const SplatSet& all = clutter.together.set;
+    if (count_of(all) == model.size())
         throw Error(flags.scene.string(), "nothing would be left",
                     "Use lower limits; --dry-run shows what each rule takes.");
     SplatModel kept = model;
-    keep_splats([&](std::size_t i) { return all.set[i] == 0; }, kept);
+    keep_splats([&](std::size_t i) { return all[i] == 0; }, kept);
     const std::optional<Judgement> judged = judge(device, photos, effects, model, kept);
     if (!flags.dry_run) write_cleaned(flags, format, inputs, written, kept);
-    write_json(flags.json, report_json(flags, rules, all, judged));
-    write_paper(flags.paper, paper_report(flags, rules, all, judged),
+    write_json(flags.json, report_json(flags, clutter, judged));
+    write_paper(flags.paper, paper_report(flags, clutter, judged),
                 together({inputs, files_of(photos.views), {flags.output}}));
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
-    tell_report(out, rules, all, judged);
+    tell_report(out, clutter, judged);
     if (!flags.dry_run)
         tell(out, "{}: {} of {} splats\n", flags.output.string(), kept.size(), model.size());
     tell_paths(flags.quiet, {flags.output, flags.json, flags.paper});
@@ -402,9 +291,7 @@ void add_clean(CLI::App& app, Action& action) {
         ->check(CLI::Range(1, 1000));
     command
         ->add_option("--region", flags->region,
-                     "remove everything outside this region: subject, which is what the cameras "
-                     "look at, with 1.25 times its radius; subject:F, with F times its radius; "
-                     "sphere:X,Y,Z,RADIUS; or box:MINX,MINY,MINZ,MAXX,MAXY,MAXZ")
+                     std::string("remove everything outside this region: ") + kRegionHelp)
         ->default_str("off");
     command->add_option("--photos", flags->photos,
                         "the scene's photos, given as to darb train; measures the PSNR of the "

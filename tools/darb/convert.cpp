@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/core/error.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/say.h"
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"

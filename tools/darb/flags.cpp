@@ -32,6 +32,11 @@ void add_accuracy_flags(CLI::App& command, AccuracyFlags& flags) {
                         accuracy_help(setting))
             ->group(option_group::kAccuracy);
     }
+    command
+        .add_flag("--steady", flags.steady,
+                  "the same as --depth-order pixel: splats do not pop, that is swap places, as the "
+                  "camera turns")
+        ->group(option_group::kAccuracy);
 }
 
 Accuracy chosen_accuracy(const AccuracyFlags& flags) {
@@ -41,6 +46,12 @@ Accuracy chosen_accuracy(const AccuracyFlags& flags) {
         const std::string& name = flags.choice[static_cast<size_t>(s)];
         if (!name.empty()) accuracy.choice[s] = find_choice(s, name);
     }
+    if (!flags.steady) return accuracy;
+    const std::string& order = flags.choice[kDepthOrder];
+    if (!order.empty() && order != kSteadyOrder)
+        throw Error("--steady", "stands beside --depth-order " + order,
+                    "Leave out one of them: --steady is --depth-order pixel.");
+    accuracy.choice[kDepthOrder] = find_choice(kDepthOrder, kSteadyOrder);
     return accuracy;
 }
 
@@ -201,6 +212,11 @@ void add_unit_options(CLI::App& command, StoredUnits& units, bool with_scales) {
                                  {{"swapped", StoredOrder::swapped}},
                                  "swapped: f_rest has the channels of a coefficient side by side, "
                                  "or, in formats that do so anyway, the coefficients of a channel");
+    command
+        .add_option("--lod", units.level,
+                    "of a streamed SOG or LCC scene: the level of detail to read")
+        ->default_str("0, the finest")
+        ->check(CLI::Range(0, 63));
 }
 
 PixelSize parse_size(const std::string& text) {
@@ -282,22 +298,6 @@ void refuse_no_numbers(const CLI::App& app) {
         }
     }
     for (const CLI::App* command : app.get_subcommands()) refuse_no_numbers(*command);
-}
-
-std::vector<double> numbers_from(const std::string& option, const std::string& text, size_t count) {
-    std::vector<double> values;
-    const char *at = text.data(), *end = at + text.size();
-    while (at <= end && values.size() <= count) {
-        double value = 0;
-        const auto [rest, error] = parse_number(at, end, value);
-        if (error != std::errc{} || !std::isfinite(value) || (rest != end && *rest != ',')) break;
-        values.push_back(value);
-        at = rest + 1;
-    }
-    if (values.size() != count || at != end + 1)
-        throw Error(option, fmt::format("'{}' is not {} numbers", text, count),
-                    "Write them with commas and without spaces.");
-    return values;
 }
 
 }  // namespace darb

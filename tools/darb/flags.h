@@ -21,6 +21,7 @@ namespace darb {
 struct AccuracyFlags {
     std::string preset;                              // empty: balanced
     std::array<std::string, kAccuracyCount> choice;  // empty: the preset's choice
+    bool steady = false;                             // --depth-order pixel by another name
 };
 
 /// For pictures; for training they are rows of trainer/job/request_options.h.
@@ -103,10 +104,6 @@ struct PixelSize {
 PixelSize parse_size(const std::string& text);
 
 // Numbers and values of a command line, as typed or as kept by a run.
-
-/// `count` finite numbers with commas between them. Throws Error naming the option.
-std::vector<double> numbers_from(const std::string& option, const std::string& text,
-                                 std::size_t count);
 
 /// Throws Error for an option with the value "", which would count as not given.
 void refuse_empty_values(const std::vector<std::string>& arguments);

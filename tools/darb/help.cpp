@@ -128,9 +128,10 @@ class HelpFormatter : public CLI::Formatter {
 }  // namespace
 
 bool is_for_few(const std::string& group) {
-    for (const char* few : {help_group::kSaving, help_group::kAccuracy, help_group::kDevice,
-                            option_group::kPhotos, option_group::kRates, option_group::kDensity,
-                            option_group::kLimits, option_group::kStart, option_group::kEffects})
+    for (const char* few :
+         {help_group::kSaving, help_group::kAccuracy, help_group::kDevice, option_group::kPhotos,
+          option_group::kRates, option_group::kDensity, option_group::kLimits, option_group::kStart,
+          option_group::kEffects, option_group::kRegion})
         if (group == few) return true;
     return false;
 }

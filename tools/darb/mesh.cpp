@@ -19,6 +19,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/say.h"
 #include "engine/core/system.h"
 #include "engine/core/text.h"

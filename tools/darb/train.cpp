@@ -219,6 +219,7 @@ void print_blocks_plan(const Device& device, const TrainJob& job) {
     say_notes(dataset.notes);
     say("device: {}\neffects: {}\n", device.description(), plan_line(job.effects));
     if (!job.strategy_note.empty()) say("{}\n", job.strategy_note);
+    if (!job.region_note.empty()) say("{}\n", job.region_note);
 }
 
 std::string summary_of(const BlocksSummary& summary, bool quiet,
@@ -281,6 +282,8 @@ void check_for_blocks(const TrainRequest& r, const RunShown& shown) {
     refuse(r.refine_cameras == "on" || effect_in_words(r.effects, "cameras").value_or(false),
            "--refine-cameras",
            "Leave it out: each block would find another pose for the same photo.");
+    refuse(r.drop_outside || r.clean_isolated || r.clean_free_space || !r.clean_haze.empty(),
+           "cleaning", "Leave it out; darb clean cleans the scene when its blocks are joined.");
     refuse(r.train.learn_kernel > 0, "--learn-kernel",
            "Leave it out: each block would find another kernel, and one scene has one.");
 }

@@ -184,7 +184,8 @@ void print_scene(const Device& device, const TrainJob& job, std::size_t held_out
     say_notes(dataset.notes);
     say("device: {}\n", device.description());
     say("effects: {}\n", plan_line(job.effects));
-    for (const std::string& note : {job.cameras_note, job.start_note, job.strategy_note})
+    for (const std::string& note :
+         {job.cameras_note, job.start_note, job.strategy_note, job.region_note})
         if (!note.empty()) say("{}\n", note);
     print_growth(job.options);
 }

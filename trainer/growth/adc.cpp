@@ -41,7 +41,8 @@ double splats_wanted(const GrowthStart& start, double threshold) {
 class Adc : public DensityStrategy {
   public:
     DensityResult round(const DensityRound& round) override {
-        return round.control.run(round.splats, round.gradient_sum, round.args, round.limit);
+        return round.control.run(round.splats, round.gradient_sum, round.args, round.limit,
+                                 round.fixed);
     }
 };
 

@@ -27,7 +27,7 @@ class Budget : public DensityStrategy {
         args.gradient_threshold = FLT_MIN;
         const std::uint32_t target =
             close_the_gap(schedule_, r.iteration, r.splats.count(), r.limit);
-        return r.control.run(r.splats, r.gradient_sum, args, target);
+        return r.control.run(r.splats, r.gradient_sum, args, target, r.fixed);
     }
 
   private:

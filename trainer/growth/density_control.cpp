@@ -61,6 +61,26 @@ void keep_frozen(Commands& commands, std::uint32_t frozen,
         if (frozen > 0) commands.fill({*values, 0, std::uint64_t{frozen} * 4}, word);
 }
 
+void clear_words(std::span<const std::uint8_t> splats, Buffer& words) {
+    std::vector<std::uint32_t> values = words.download<std::uint32_t>(splats.size());
+    for (std::size_t i = 0; i < values.size(); ++i)
+        if (splats[i] != 0) values[i] = 0;
+    words.upload(values);
+}
+
+namespace {
+
+// What density control decided on these splats, but for those that go: they stay as they are.
+void stop_growth(std::span<const std::uint8_t> fixed, Buffer& grow, Buffer& action) {
+    std::vector<std::uint32_t> actions = action.download<std::uint32_t>(fixed.size());
+    for (std::size_t i = 0; i < actions.size(); ++i)
+        if (fixed[i] != 0 && actions[i] != DENSIFY_PRUNE) actions[i] = DENSIFY_KEEP;
+    action.upload(actions);
+    clear_words(fixed, grow);
+}
+
+}  // namespace
+
 DensityControl::DensityControl(Device& device, int kernel, Footprint footprint)
     : device_(&device), commands_(device) {
     const SpecConstants threads{{"THREADS", SPLAT_GROUP}};
@@ -88,7 +108,8 @@ void DensityControl::set_kernel(int kernel, Footprint footprint) {
 }
 
 DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
-                                  gpu::DensifyArgs args, std::uint32_t max_splats) {
+                                  gpu::DensifyArgs args, std::uint32_t max_splats,
+                                  std::span<const std::uint8_t> fixed) {
     const std::uint32_t n = args.splat_count = splats.count();
     DensityResult result{n, n, 0, 0};
     if (n == 0) return result;
@@ -106,6 +127,12 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
                         gradient_sum, keep, grow, action},
                        g.x, g.y);
     keep_frozen(commands_, splats.frozen(), {{&keep, 1}, {&grow, 0}, {&action, DENSIFY_KEEP}});
+    if (!fixed.empty()) {
+        commands_.submit_and_wait();
+        stop_growth(fixed, grow, action);
+        commands_.begin();
+        commands_.pass("densify");
+    }
     scan.record(commands_, keep, keep_offset, count, 0, keep_total);
     scan.record(commands_, grow, grow_offset, count, 0, grow_total);
     commands_.submit_and_wait();

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <initializer_list>
+#include <span>
 
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
@@ -32,6 +33,9 @@ struct FrozenWord {
 /// Puts these in place of what was decided on the first `frozen` splats.
 void keep_frozen(Commands& commands, std::uint32_t frozen, std::initializer_list<FrozenWord> words);
 
+/// Zeros the word of each splat that is set in `splats`, [N] 0 or 1. The queue must be idle.
+void clear_words(std::span<const std::uint8_t> splats, Buffer& words);
+
 class DensityControl {
   public:
     DensityControl(Device& device, int kernel, Footprint footprint = Footprint::psi);
@@ -39,8 +43,9 @@ class DensityControl {
     /// One round. gradient_sum: [N][2] of Backward. The queue must be idle. args.splat_count is set
     /// here. Beyond max_splats nothing grows, the largest mean gradients go first. New buffers
     /// replace the old ones one attribute at a time, so the peak is one attribute above the total.
+    /// fixed: [N], 1 for splats that are pruned but do not grow; empty: none.
     DensityResult run(GpuSplats& splats, const Buffer& gradient_sum, gpu::DensifyArgs args,
-                      std::uint32_t max_splats);
+                      std::uint32_t max_splats, std::span<const std::uint8_t> fixed = {});
 
     /// Device memory between rounds.
     static std::uint64_t fixed_bytes(int kernel);

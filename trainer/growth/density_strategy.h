@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "engine/gpu/commands.h"
 #include "engine/raster/gpu_splats.h"
@@ -28,7 +29,8 @@ struct DensityRound {
     const Buffer& gradient_sum;  // [N][2] of Backward
     gpu::DensifyArgs args;       // as the schedule has them
     int iteration;
-    std::uint32_t limit;  // no more splats than these, whatever it is that sets it
+    std::uint32_t limit;                   // no more splats than these, whatever it is that sets it
+    std::vector<std::uint8_t> fixed = {};  // [N], 1 for those that do not grow; empty: none
 };
 
 /// What a run makes of a row. It keeps nothing from round to round. The queue is idle in round().

@@ -64,8 +64,8 @@ class Mcmc : public DensityStrategy {
         next_kernel_.reset();
         const std::uint32_t count = r.splats.count();
         const std::uint32_t target = grow_by_share(schedule_, r.iteration, count, r.limit);
-        return relocation_.run(r.splats, r.control, r.args.prune_opacity, target - count,
-                               r.args.seed);
+        return relocation_.run(r.splats, r.control,
+                               {r.args.prune_opacity, target - count, r.args.seed, r.fixed});
     }
 
   private:
@@ -134,8 +134,9 @@ std::uint64_t Relocation::device_bytes(int kernel) {
     return row * (kernel_has_shape(kernel) ? SHAPE_ROWS : 1) * sizeof(float);
 }
 
-DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float dead_opacity,
-                              std::uint32_t grown, std::uint32_t seed) {
+DensityResult Relocation::run(GpuSplats& splats, DensityControl& density,
+                              const RelocationRound& round) {
+    const std::uint32_t grown = round.grown;
     const std::uint32_t n = splats.count();
     DensityResult result{n, n, 0, 0};
     if (n == 0) return result;
@@ -147,13 +148,19 @@ DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float 
         weight_total(d, "weight total", 4);
     Scan scan(d, n);
     const Groups g = groups_for(n);
-    gpu::RelocationArgs args{n, n, 0, 0, dead_opacity, weight_scale(n), seed};
+    gpu::RelocationArgs args{n, n, 0, 0, round.dead_opacity, weight_scale(n), round.seed};
     commands_.begin();
     commands_.pass("relocate");
     commands_.fill(count, n);
     commands_.dispatch(weight_, args, {splats.parameters(kOpacityLogit), dead, weight, copies}, g.x,
                        g.y);
     keep_frozen(commands_, splats.frozen(), {{&dead, 0}, {&weight, 0}});
+    if (!round.fixed.empty()) {
+        commands_.submit_and_wait();
+        clear_words(round.fixed, weight);
+        commands_.begin();
+        commands_.pass("relocate");
+    }
     scan.record(commands_, dead, dead_offset, count, 0, dead_total);
     scan.record(commands_, weight, weight_offset, count, 0, weight_total);
     commands_.submit_and_wait();

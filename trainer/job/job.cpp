@@ -8,8 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/source.h"
 #include "engine/data/track_adjustment.h"
+#include "engine/scene/clutter.h"
+#include "engine/scene/region.h"
 #include "trainer/growth/predicted_growth.h"
 #include "trainer/job/training_data.h"
 #include "trainer/options/strategy.h"
@@ -81,6 +84,34 @@ void plan_effects(TrainJob& job, bool looks) {
             "laid on surfaces with --effects +surface");
 }
 
+// By the cameras and the points that the data set came with, which a run that goes on has as well.
+void plan_region(TrainJob& job) {
+    if (job.request.region.empty()) return;
+    const SplatModel points = initial_model(job.dataset, job.options);
+    job.options.region =
+        region_from("--roi", job.request.region, points, cameras_of(job.dataset.views));
+    job.region_note = fmt::format("region: {}", region_text(*job.options.region));
+    if (starts_random(job.dataset, job.options)) return;
+    const std::size_t inside =
+        points.size() - count_of(splats_outside(*job.options.region, points));
+    if (inside == 0)
+        throw Error("--roi " + job.request.region,
+                    fmt::format("none of the data set's {} points lies in it", points.size()),
+                    "Name a region around what the photos show, in the data set's coordinates; "
+                    "--roi subject finds one.");
+    job.region_note += fmt::format(", with {} of {} points", inside, points.size());
+}
+
+CleaningRules cleaning_of(const TrainJob& job) {
+    const TrainRequest& request = job.request;
+    CleaningRules rules;
+    rules.isolated = request.clean_isolated.value_or(0);
+    rules.free_space = static_cast<std::uint32_t>(request.clean_free_space.value_or(0));
+    if (!request.clean_haze.empty()) take_haze("--clean-haze", request.clean_haze, rules);
+    if (request.drop_outside) rules.region = job.options.region;
+    return rules;
+}
+
 void plan_strategy(TrainJob& job) {
     TrainOptions& t = job.options;
     if (job.dataset.detail.opaque == 0) job.dataset.detail = photo_detail(job.dataset.views);
@@ -108,6 +139,7 @@ TrainJob resolve(TrainRequest request, Dataset dataset, std::vector<ImageU8> pho
     job.dataset = std::move(dataset);
     job.photos = std::move(photos);
     plan_effects(job, looks);
+    plan_region(job);
     plan_strategy(job);
     return job;
 }
@@ -169,6 +201,7 @@ RunOptions run_options(const TrainJob& job, const JobSinks& sinks) {
     run.effects_json =
         plan_json(job.effects).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
     run.pace = job.pace;
+    run.cleaning = cleaning_of(job);
     run.quiet = sinks.quiet;
     run.on_step = sinks.on_step;
     run.ranks = sinks.ranks;

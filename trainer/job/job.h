@@ -28,7 +28,7 @@ struct TrainJob {
     std::filesystem::path resume_from = {};  // a checkpoint; empty: the run starts afresh
     std::optional<PaceForecast> pace = {};   // for the time that is left
     // What was decided, one line of text each; may be empty.
-    std::string cameras_note = {}, start_note = {}, strategy_note = {};
+    std::string cameras_note = {}, start_note = {}, strategy_note = {}, region_note = {};
     std::vector<std::string> notes = {};  // options that are not used, and why
 };
 

@@ -201,6 +201,8 @@ std::vector<std::string> unused_options(const TrainRequest& r) {
     if (r.train.shape_lr && !kernel_has_shape(kernel))
         notes.push_back("--shape-lr is not used: splats have shapes of their own with --kernel " +
                         shaped_kernel_names());
+    if (r.drop_outside && r.region.empty())
+        notes.emplace_back("--drop-outside is not used: no --roi says what lies outside");
     // Scripts give those of long runs to short ones, too.
     const std::pair<const char*, const std::vector<int>&> lists[] = {
         {"--test-iterations", r.test_iterations},

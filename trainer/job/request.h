@@ -7,6 +7,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,7 @@ struct TrainRequest {
     // What the run trains on.
     std::string dataset;  // a folder, a .json file or a video, as load_training_data() takes it
     DatasetOptions data{.original_where_wide = true};
+    std::filesystem::path points;    // in place of the data set's: PLY or LAS; empty: its own
     bool sequential = false;         // photos without cameras: match neighbours in name order only
     std::string panoramas = "auto";  // photos without cameras show all directions: on, off, or
                                      // auto, by what the files say
@@ -37,6 +39,12 @@ struct TrainRequest {
     std::string refine_cameras = "auto";  // auto: as the plan of effects says; on; off
     bool antialiasing = false;            // as 3DGS spells +antialias
     std::string blocks;  // "auto" or "COLUMNSxROWS": train in parts; empty: the scene as a whole
+
+    // What part of the scene it is about, and what of it goes before it is saved.
+    std::string region;         // as region_from() reads it; empty: all of it
+    bool drop_outside = false;  // with a region: splats outside go
+    std::optional<double> clean_isolated, clean_free_space;  // CleaningRules; absent: off
+    std::string clean_haze;                                  // OPACITY,SIZE; empty: off
 
     // Where it trains, and what it leaves.
     std::filesystem::path output;

@@ -8,6 +8,8 @@
 #include "engine/core/text.h"
 #include "engine/kernels/kernel_definition.h"
 #include "engine/plan/effect_plan.h"
+#include "engine/render/cleaning.h"
+#include "engine/scene/region.h"
 #include "trainer/job/request_options.h"
 #include "trainer/options/presets.h"
 #include "trainer/options/strategy.h"
@@ -302,6 +304,16 @@ void scene_rows(Rows& rows) {
          .key = "strategy",
          .take = take_strategy,
          .saved = [](const Request& r) { return std::string(strategy_name(r.train.strategy)); }});
+    rows.push_back({.row = {.flags = "--points",
+                            .group = option_group::kStart,
+                            .help = "a PLY or LAS file of points, in the coordinates of the "
+                                    "cameras, to start from in place of the data set's",
+                            .usual = "the data set's"},
+                    .section = "data",
+                    .key = "points",
+                    .place = [](Request& r) -> RequestPlace { return &r.points; },
+                    .saved = [](const Request& r) { return path_in_file(r, r.points); },
+                    .restore = [](Request& r, Text text) { r.points = path_of_file(r, text); }});
     rows.push_back(
         {.row = {.flags = "--start",
                  .group = option_group::kStart,
@@ -314,6 +326,62 @@ void scene_rows(Rows& rows) {
          .saved = [](const Request& r) -> std::string {
              return kStarts[static_cast<int>(r.train.start)];
          }});
+}
+
+void region_rows(Rows& rows) {
+    static const std::string region =
+        std::string("train this part of the scene: splats outside it do not grow in number. ") +
+        kRegionHelp;
+    rows.push_back({.row = {.flags = "--roi",
+                            .group = option_group::kRegion,
+                            .help = region.c_str(),
+                            .usual = "the whole scene"},
+                    .key = "roi",
+                    .place = [](Request& r) -> RequestPlace { return &r.region; },
+                    .take =
+                        [](Request& r, Text text) {
+                            check_region("--roi", text);
+                            r.region = text;
+                        }});
+    rows.push_back({.row = {.flags = "--drop-outside",
+                            .group = option_group::kRegion,
+                            .help = "with --roi: leave splats outside of it out of the scene that "
+                                    "is saved at the end",
+                            .is_switch = true},
+                    .key = "drop_outside",
+                    .place = [](Request& r) -> RequestPlace { return &r.drop_outside; }});
+    rows.push_back({.row = {.flags = "--clean-isolated",
+                            .group = option_group::kRegion,
+                            .help = "leave parts that touch nothing else out of the scene that is "
+                                    "saved at the end, as `darb clean --isolated` does; 0.01 is a "
+                                    "usual share",
+                            .usual = "off",
+                            .least = 0,
+                            .most = 1},
+                    .key = "clean_isolated",
+                    .place = [](Request& r) -> RequestPlace { return &r.clean_isolated; }});
+    rows.push_back({.row = {.flags = "--clean-haze",
+                            .group = option_group::kRegion,
+                            .help = "OPACITY,SIZE, such as 0.1,5: the same for haze, as `darb "
+                                    "clean --haze` does",
+                            .usual = "off"},
+                    .key = "clean_haze",
+                    .place = [](Request& r) -> RequestPlace { return &r.clean_haze; },
+                    .take =
+                        [](Request& r, Text text) {
+                            CleaningRules checked;
+                            take_haze("--clean-haze", text, checked);
+                            r.clean_haze = text;
+                        }});
+    rows.push_back({.row = {.flags = "--clean-free-space",
+                            .group = option_group::kRegion,
+                            .help = "a number of views, such as 3: the same for what floats in "
+                                    "free space, as `darb clean --free-space` does",
+                            .usual = "off",
+                            .least = 1,
+                            .most = 1000},
+                    .key = "clean_free_space",
+                    .place = [](Request& r) -> RequestPlace { return &r.clean_free_space; }});
 }
 
 void effect_rows(Rows& rows) {
@@ -464,8 +532,8 @@ void saving_rows(Rows& rows) {
 
 Rows make_rows() {
     Rows rows;
-    for (const auto add :
-         {whole_rows, place_rows, photo_rows, run_rows, scene_rows, effect_rows, accuracy_rows})
+    for (const auto add : {whole_rows, place_rows, photo_rows, run_rows, scene_rows, region_rows,
+                           effect_rows, accuracy_rows})
         add(rows);
     for (const OptionRow& row : option_rows())
         if (!std::holds_alternative<std::monostate>(row.member))

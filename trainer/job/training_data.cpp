@@ -365,6 +365,7 @@ Dataset load_training_data(TrainRequest& request, std::optional<RunLock>& lock,
             fmt::format("--panoramas {} changes nothing: the data set has cameras, which say what "
                         "its photos show.",
                         request.panoramas));
+    if (!request.points.empty()) replace_points(request.points, dataset);
     if (dataset.points.size() == 0) dataset.notes.push_back("There are no sparse points.");
     if (request.train.random_points && dataset.points.size() > 0)
         dataset.notes.push_back(

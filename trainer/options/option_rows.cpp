@@ -479,6 +479,11 @@ const OptionRow kRows[] = {
      .resolved = [](const Opt&, const Sched& s) -> Json { return s.length_scale; },
      .stands = [](const Opt&, const Sched& s) { return s.length_scale != 1; }},
 
+    {.setting = "/region",
+     .group = option_group::kRegion,
+     .resolved = [](const Opt& o, const Sched&) -> Json { return region_text(*o.region); },
+     .stands = [](const Opt& o, const Sched&) { return o.region.has_value(); }},
+
     {.setting = "/start",
      .group = option_group::kStart,
      .resolved = [](const Opt& o, const Sched&) -> Json { return start_name(o.start); },

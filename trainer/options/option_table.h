@@ -28,9 +28,9 @@ namespace option_group {
 inline constexpr const char *kRun = "Run", *kScene = "Scene", *kPhotos = "Photos in training",
                             *kRates = "Learning rates", *kDensity = "Density control",
                             *kLimits = "Regularisers and limits of splats", *kStart = "Start",
-                            *kEffects = "Effects", *kInput = "Photos and output",
-                            *kSaving = "Saving and testing", *kAccuracy = "Accuracy",
-                            *kDevice = "Device and passes";
+                            *kEffects = "Effects", *kRegion = "Region and cleaning",
+                            *kInput = "Photos and output", *kSaving = "Saving and testing",
+                            *kAccuracy = "Accuracy", *kDevice = "Device and passes";
 }
 
 /// What an option takes.

@@ -10,6 +10,7 @@
 #include "engine/kernels/kernel_family.h"
 #include "engine/plan/accuracy.h"
 #include "engine/raster/forward_options.h"
+#include "engine/scene/region.h"
 
 #define DARB_STRATEGIES(ROW) \
     ROW(adc)                 \
@@ -81,6 +82,10 @@ struct TrainOptions {
     bool random_background = true;  // train over another colour each iteration: no surface can
                                     // stay half transparent to borrow the background's colour
     float lambda_dssim = 0.2f;
+
+    // Where splats grow in number; absent: everywhere. Those outside are trained and pruned, but
+    // not cloned, split or drawn as places for others, so that they stay as coarse as they began.
+    std::optional<Region> region;
 
     // Learning rates of Adam; position is log-linear over the run and in units of the scene extent.
     // Absent: 1.6e-4 to 1.6e-6, higher by the root of 30,000 / iterations, without which short runs

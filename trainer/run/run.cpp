@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -20,6 +22,9 @@
 #include "engine/kernels/learned_profile.h"
 #include "engine/plan/tuner.h"
 #include "engine/raster/frame_view.h"
+#include "engine/render/cleaning.h"
+#include "engine/render/free_space.h"
+#include "engine/render/renderer.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/ply.h"
 #include "trainer/growth/initial_model.h"
@@ -100,6 +105,8 @@ class Run {
                "point_cloud.ply";
     }
     void save_model(int iteration);
+    void clean(int iteration, SplatModel& model);
+    void leave_out(int iteration, const Clutter& clutter, SplatModel& model);
     void write_cameras();
     void write_kernel();
     void show_step();
@@ -240,6 +247,7 @@ void Run::save_model(int iteration) {
     // Those that are frozen keep their numbers, by which they are taken out again.
     const std::size_t all = model.size();
     summary_.undrawn = drop_undrawn(schedule_.undrawn_opacity, run_.frozen, model);
+    if (run_.cleaning.any() && iteration == trainer_.last_iteration()) clean(iteration, model);
     summary_.saved = model.size();
     if (summary_.undrawn > 0)
         progress_.note(
@@ -253,6 +261,55 @@ void Run::save_model(int iteration) {
     if (trainer_.camera_moves()) write_cameras();
     if (schedule_.options.learn_kernel > 0) write_kernel();
     stopwatch(true);
+}
+
+// By the cameras of the training photos, as they are trained now.
+void Run::clean(int iteration, SplatModel& model) {
+    std::vector<Camera> cameras;
+    for (std::size_t v = 0; v < dataset_.views.size(); ++v)
+        if (!dataset_.views[v].is_test) cameras.push_back(trainer_.camera(v));
+    const TrainOptions& o = schedule_.options;
+    try {
+        const Clutter clutter =
+            find_clutter(device_, model, evenly_chosen(cameras), run_.cleaning, [&] {
+                return std::make_unique<Renderer>(device_, model, Accuracy{}, o.projection,
+                                                  o.huge_splat_path);
+            });
+        leave_out(iteration, clutter, model);
+    } catch (const NoRoom&) {
+        progress_.warn(
+            "the scene is not cleaned: the device has no memory for that beside the run; darb "
+            "clean does it afterwards");
+    }
+}
+
+void Run::leave_out(int iteration, const Clutter& clutter, SplatModel& model) {
+    const auto tell = [&](const ClutterOfRule& rule) {
+        progress_.note(fmt::format("cleaning, {}: {} of {} splats, {:.2f} % of the light",
+                                   rule.rule, count_of(rule.set), rule.set.size(),
+                                   100 * rule.light));
+    };
+    for (const ClutterOfRule& rule : clutter.rules) tell(rule);
+    if (clutter.rules.size() > 1) tell(clutter.together);
+    const SplatSet& goes = clutter.together.set;
+    if (count_of(goes) == goes.size())
+        return progress_.warn("the scene is not cleaned: nothing would be left of it");
+    keep_splats([&](std::size_t i) { return goes[i] == 0; }, model);
+    ForwardOptions pictures = forward_options(schedule_.options);
+    pictures.store_for_backward = pictures.depth_sum = pictures.depth_spread = false;
+    Renderer renderer(device_, model, pictures);
+    const Evaluation after =
+        evaluate_held_out(trainer_, dataset_, photos_, [&](const Camera& camera) {
+            return renderer.render(camera, trainer_.background(), trainer_.sh_degree());
+        });
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    const std::vector<Evaluation>& before = summary_.evaluations;
+    const bool measured = !after.views.empty() && !before.empty();
+    if (measured)
+        progress_.note(fmt::format("cleaning: held-out PSNR {:.2f} dB before, {:.2f} dB after",
+                                   before.back().psnr_db, after.psnr_db));
+    log_.cleaned(iteration, clutter, measured ? before.back().psnr_db : none,
+                 measured ? after.psnr_db : none);
 }
 
 // A file for --kernel-file.

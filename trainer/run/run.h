@@ -17,6 +17,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
+#include "engine/render/cleaning.h"
 #include "trainer/options/schedule.h"
 #include "trainer/run/progress.h"
 #include "trainer/run/run_report.h"
@@ -52,6 +53,7 @@ struct RunOptions {
     std::string request;               // content of request.json, for --resume; may be empty
     std::string effects;               // the plan in a line, for the log
     std::string effects_json;          // the same as JSON, for metrics.json; may be empty
+    CleaningRules cleaning;            // what goes from the scene that is saved at the end
     RankGroup ranks;                   // that train together; the first one writes and talks
     /// Writes into OUT/start what splats start from, once an earlier run is out of the way; may be
     /// empty.

@@ -205,6 +205,21 @@ void RunLog::ends_early(int iteration, int end, const std::string& reason) {
     write({{"event", "ends_early"}, {"iteration", iteration}, {"end", end}, {"reason", reason}});
 }
 
+void RunLog::cleaned(int iteration, const Clutter& clutter, double psnr_before, double psnr_after) {
+    nlohmann::json rules = nlohmann::json::array();
+    const auto add = [&rules](const ClutterOfRule& rule) {
+        rules.push_back(
+            {{"rule", rule.rule}, {"splats", count_of(rule.set)}, {"light_share", rule.light}});
+    };
+    for (const ClutterOfRule& rule : clutter.rules) add(rule);
+    if (clutter.rules.size() > 1) add(clutter.together);
+    write({{"event", "cleaned"},
+           {"iteration", iteration},
+           {"rules", rules},
+           {"psnr_before", psnr_before},
+           {"psnr_after", psnr_after}});
+}
+
 void RunLog::failure(int iteration, const std::string& what) {
     try {
         write({{"event", "failure"}, {"iteration", iteration}, {"what", shared_text(what)}});

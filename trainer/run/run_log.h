@@ -58,6 +58,9 @@ class RunLog {
     /// For a run that may end by itself: logs the PSNR of held-out photos, or that the run ends.
     void look(int iteration, double psnr_db);
     void ends_early(int iteration, int end, const std::string& reason);
+    /// What was left out of the scene that was saved at the end, and what that does to held-out
+    /// photos; NaN where none is held out.
+    void cleaned(int iteration, const Clutter& clutter, double psnr_before, double psnr_after);
     /// What ended the run before its time; nothing where the log cannot be written.
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);

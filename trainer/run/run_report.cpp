@@ -274,14 +274,16 @@ void take_means(Evaluation& evaluation) {
 }
 
 Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
-                             const std::vector<ImageU8>& photos) {
+                             const std::vector<ImageU8>& photos,
+                             const std::function<ImageF(const Camera&)>& render) {
     Evaluation evaluation;
     for (size_t i = 0; i < dataset.views.size(); ++i) {
         const View& view = dataset.views[i];
         if (!view.is_test) continue;
-        evaluation.views.push_back(compare_view(view.name, trainer.render(trainer.camera(i)),
-                                                photos[i], trainer.background(),
-                                                dataset.alpha_is_mask));
+        const Camera& camera = trainer.camera(i);
+        evaluation.views.push_back(
+            compare_view(view.name, render ? render(camera) : trainer.render(camera), photos[i],
+                         trainer.background(), dataset.alpha_is_mask));
         evaluation.views.back().in_arc = view.in_arc;
     }
     take_means(evaluation);

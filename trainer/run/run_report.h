@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -95,8 +96,10 @@ struct Evaluation {
 void take_means(Evaluation& evaluation);
 
 /// Only views, means: iteration, seconds and splats are the caller's. photos: all views' in order.
+/// render: draws another scene, RGB not clamped, in place of the trainer's.
 Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
-                             const std::vector<ImageU8>& photos);
+                             const std::vector<ImageU8>& photos,
+                             const std::function<ImageF(const Camera&)>& render = {});
 
 /// photo | render | absolute error x 4, a PNG a held-out view, in the order of the views.
 std::vector<std::filesystem::path> write_side_by_side(Trainer& trainer, const Dataset& dataset,

@@ -303,13 +303,26 @@ void Trainer::follow_first() {
 
 DensityResult Trainer::run_round(int iteration) {
     const std::uint32_t limit = least(*ranks_.all, memory_.growth_limit(held(), totals_.counters));
-    const DensityResult result = strategy_->round(
-        {splats_, density_, step_.gradient_sum(), round_args(iteration), iteration, limit});
+    const DensityResult result =
+        strategy_->round({splats_, density_, step_.gradient_sum(), round_args(iteration), iteration,
+                          limit, outside()});
     memory_.end_round(result.after);
     end_round(result);
     reorder();
     step_.clear_gradient_sum();
     return result;
+}
+
+// In double, by the one definition of what lies in a region. Rounds are few, and a round waits for
+// the device anyway.
+std::vector<std::uint8_t> Trainer::outside() const {
+    const std::optional<Region>& region = schedule_.options.region;
+    if (!region) return {};
+    SplatModel places;
+    places.origin = splats_.origin();
+    places.resize(splats_.count());
+    places.position = splats_.parameters(kPosition).download<float>(3 * places.size());
+    return splats_outside(*region, places);
 }
 
 DensityResult Trainer::end_round(const DensityResult& result) {

@@ -175,6 +175,7 @@ class Trainer {
     void finish(const StepOutcome& outcome);
     std::optional<DensityResult> control_density();
     DensityResult run_round(int iteration);
+    std::vector<std::uint8_t> outside() const;
     std::optional<DensityResult> drop_undrawn();
     DensityResult end_round(const DensityResult& result);
     void open_step();

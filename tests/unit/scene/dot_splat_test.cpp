@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "engine/scene/dot_splat.h"
 
+#include <fmt/format.h>
+
 #include <limits>
 
+#include "engine/scene/splat_file.h"
 #include "tests/support/splat_files.h"
 
 namespace darb::test {
@@ -91,6 +94,23 @@ TEST(DotSplat, other_content_does_not_look_like_it) {
     append_text(std::string(320, 'a'), text);
     EXPECT_FALSE(looks_like_dot_splat(text));
     EXPECT_FALSE(looks_like_dot_splat(FileBytes(33)));
+}
+
+// A file whose first 5,837 bytes were cut off, and as many at its end as make its size right.
+TEST(DotSplat, records_out_of_phase_are_refused) {
+    const FileBytes whole = encode_dot_splat(sample_model(0, 400));
+    for (const std::size_t gone : {std::size_t{5'837}, std::size_t{1}, std::size_t{31}}) {
+        FileBytes cut(whole.begin() + static_cast<std::ptrdiff_t>(gone), whole.end());
+        const std::string at = fmt::format("begin at byte {}", (32 - gone % 32) % 32);
+        EXPECT_NE(error_of([&] { parse_dot_splat(cut, "test.splat"); }).find(at), std::string::npos)
+            << gone;
+        cut.resize(cut.size() / 32 * 32);
+        const std::string error = error_of([&] { parse_splats(cut, "test.splat"); });
+        EXPECT_NE(error.find(at), std::string::npos) << error;
+        EXPECT_NE(error.find("from its beginning"), std::string::npos) << error;
+    }
+    const FileBytes aligned(whole.begin() + 32 * 7, whole.end());
+    EXPECT_EQ(parse_dot_splat(aligned, "test.splat").size(), 393u);
 }
 
 }  // namespace

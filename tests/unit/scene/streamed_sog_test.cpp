@@ -84,6 +84,20 @@ TEST_F(StreamedSog, levels_are_written_and_the_finest_is_read) {
     std::ranges::sort(after);
     for (size_t i = 0; i < before.size(); ++i) ASSERT_NEAR(before[i], after[i], 2e-4);
     EXPECT_EQ(facts.notes.size(), 1u);
+    StoredUnits units;
+    units.level = 1;
+    EXPECT_EQ(load_splats(folder_, &facts, units).size(), 2000u);
+    EXPECT_EQ(facts.notes.size(), 0u);
+    EXPECT_NE(facts.details.find("level 1"), std::string::npos);
+    units.level = 2;
+    const std::string error = error_of([&] { load_splats(folder_, &facts, units); });
+    EXPECT_NE(error.find("has 2 levels of detail, no level 2"), std::string::npos) << error;
+    EXPECT_NE(error.find("--lod 0"), std::string::npos) << error;
+    save_splats(folder_ / "one.ply", SplatFormat::ply, model);
+    EXPECT_NE(error_of([&] {
+                  load_splats(folder_ / "one.ply", &facts, units);
+              }).find("has no levels of detail"),
+              std::string::npos);
 }
 
 /// Checks that the rows that each leaf names lie within its box. Returns the number of leaves.

@@ -56,6 +56,11 @@ class Request : public testing::Test {
         r.effects = "none,+exposure";
         r.refine_cameras = "on";
         r.antialiasing = true;
+        r.region = "box:0,0,0,1,1,1";
+        r.drop_outside = true;
+        r.clean_isolated = 0.02;
+        r.clean_haze = "0.1,5";
+        r.clean_free_space = 4;
         r.device = "llvm";
         r.tune = "scan=thread";
         r.test_iterations = {5, 6};
