@@ -59,6 +59,8 @@ class RunLog {
     void look(int iteration, double psnr_db);
     void ends_early(int iteration, int end, const std::string& reason);
     /// What ended the run before its time; nothing where the log cannot be written.
+    /// Settings were changed after this iteration; what: change_text().
+    void changed(int iteration, const std::string& what, const Schedule& now);
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);
     /// The passes of the run so far, in their order.
