@@ -55,8 +55,8 @@ class ChangedRun : public testing::Test {
         TrainRequest r;
         r.dataset = kScene;
         r.output = folder_ / name;
-        for (const auto& [option, value] :
-             GivenOptions{{"-r", "8"}, {"--iterations", "80"}, {"--effects", "none"}})
+        for (const auto& [option, value] : GivenOptions{
+                 {"-r", "8"}, {"--iterations", "80"}, {"--effects", "none"}, {"--eval", "on"}})
             set_request_option(r, option, value);
         complete_request(r);
         return r;
@@ -67,7 +67,7 @@ class ChangedRun : public testing::Test {
         sinks.on_step = [&, stop](const LiveStep& step) {
             LiveAnswer answer;
             if (step.iteration == 20)
-                answer.changes = {{.iterations = 10}, {.iterations = 120, .max_splats = 3'000}};
+                answer.changes = {{.iterations = 10}, {.iterations = 120, .max_splats = 4'100}};
             answer.measures = step.iteration == 30;
             answer.saves = step.iteration == 30;
             answer.stops = step.iteration == stop;
@@ -87,7 +87,7 @@ TEST_F(ChangedRun, goes_on_with_its_settings_and_is_resumed_with_them) {
     const TrainResult whole = train_on(request("whole"));
     EXPECT_EQ(whole.iteration, 120);
     EXPECT_EQ(iterations_, 120);
-    EXPECT_LE(whole.saved, 3'000u);
+    EXPECT_LE(whole.saved, 4'100u);
     ASSERT_GE(said_.size(), 3u);
     EXPECT_NE(said_[0].find("not changed: Iteration 10 is over"), std::string::npos) << said_[0];
     EXPECT_NE(said_[1].find("iterations 120 instead of 80"), std::string::npos) << said_[1];
@@ -100,6 +100,7 @@ TEST_F(ChangedRun, goes_on_with_its_settings_and_is_resumed_with_them) {
     ASSERT_EQ(metrics["changes"].size(), 1u);
     EXPECT_EQ(metrics["changes"][0]["iteration"], 20);
     EXPECT_EQ(metrics["changes"][0]["settings"]["iterations"], 120);
+    EXPECT_EQ(metrics["changes"][0]["settings"]["max_splats"], 4'100);
     EXPECT_NE(read_text_file(folder_ / "whole/report.html").find("settings were changed"),
               std::string::npos);
 
@@ -108,7 +109,7 @@ TEST_F(ChangedRun, goes_on_with_its_settings_and_is_resumed_with_them) {
     EXPECT_EQ(part.iteration, 50);
     TrainRequest saved = read_request(folder_ / "part");
     EXPECT_EQ(saved.train.iterations, 120);
-    EXPECT_EQ(saved.train.max_splats, 3'000u);
+    EXPECT_EQ(saved.train.max_splats, 4'100u);
     const TrainResult resumed = train_on(saved);
     EXPECT_EQ(resumed.iteration, 120);
     EXPECT_EQ(read_file(resumed.model), read_file(whole.model));
