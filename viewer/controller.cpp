@@ -133,6 +133,7 @@ void Controller::act(int width, int height) {
         [&](request::CloseMesh) { painter_->close_mesh(); },
         [&](request::CancelLoad) { document_->cancel_load(); },
         [&](request::CancelWork) { painter_->cancel_work(); },
+        [&](const request::AskRun& ask) { s.run_desk.wishes.push_back(ask.wish); },
         [&](request::Quit) { quit(); },
         [&](request::SaveAndLeave) { save_and_leave(); },
         [&](request::Leave) { leave(); },

@@ -235,7 +235,9 @@ void Document::follow_photo(int width, int height) {
     const Camera camera =
         camera_in_window(p, session_->navigation, free_area(*session_, width, height));
     p.shown_fov_y = 2 * std::atan(0.5 * height / camera.fy);
-    p.shown_centre_x = draws_every_centre(session_->display.effects) ? camera.cx / width : 0.5;
+    const bool any_centre = draws_every_centre(session_->display.effects);
+    p.shown_centre_x = any_centre ? camera.cx / width : 0.5;
+    p.shown_centre_y = any_centre ? camera.cy / height : 0.5;
 }
 
 void Document::choose_camera(int n) {
@@ -263,11 +265,13 @@ void Document::need_scene(const char* what) const {
 void Document::frame_on(const Bounds& bounds, int width, int height) {
     leave_photo(*session_);
     Navigation& n = session_->navigation;
-    const double panel = free_area(*session_, width, height).left, free = width - panel;
-    const bool beside = panel > 0 && draws_every_centre(session_->display.effects);
-    n.centre_x = beside ? (panel + free / 2) / width : 0.5;
-    const double wide = beside ? free : width;
-    const double tan_y = std::tan(n.fov_y / 2), tan_x = tan_y * wide / height;
+    const WindowArea area = free_area(*session_, width, height);
+    const bool beside = draws_every_centre(session_->display.effects);
+    n.centre_x = beside ? (area.left + area.free_width() / 2.0) / width : 0.5;
+    n.centre_y = beside ? (area.top + area.free_height() / 2.0) / height : 0.5;
+    const double wide = beside ? area.free_width() : width;
+    const double high = beside ? area.free_height() : height;
+    const double tan_y = std::tan(n.fov_y / 2) * high / height, tan_x = tan_y * wide / high;
     const double distance = session_->scene
                                 ? framing_distance(session_->scene->model, bounds, n.axes,
                                                    kFilled * tan_x, kFilled * tan_y)
@@ -275,7 +279,7 @@ void Document::frame_on(const Bounds& bounds, int width, int height) {
     if (distance > 0)
         n.look_from(bounds.centre, distance);
     else
-        n.frame(bounds.centre, bounds.radius, wide / height);
+        n.frame(bounds.centre, bounds.radius, wide / high);
 }
 
 // Cameras belong to the scene with which they were opened.
@@ -284,6 +288,7 @@ void Document::find_own_cameras(const std::filesystem::path& scene,
     if (!options_.find_cameras) return;
     leave_photo(*session_);
     session_->photos = Photos();
+    session_->thumbnails.reset();
     try {
         session_->photos.views = without_shutters(options_.find_cameras(scene));
     } catch (const std::exception& e) {
@@ -327,7 +332,7 @@ void Document::follow_plan() {
 
 void Document::follow_run(LivePicture& pictures, const Bounds& bounds, const LiveScene& scene) {
     live_ = &pictures;
-    live_bounds_ = bounds;
+    live_bounds_ = session_->run_bounds = bounds;
     session_->training.live = true;
     show_as_trained(scene, true);
     session_->fly_speed = bounds.radius / 2;
@@ -454,10 +459,10 @@ void Document::save_page(Device& device, int width, int height) {
     View shown;
     shown.name = "As it was saved";
     // The page shows what is seen beside the panel, as it has none.
-    const int left = free_area(s, width, height).left;
+    const WindowArea area = free_area(s, width, height);
     Navigation centred = s.navigation;
-    centred.centre_x = 0.5;
-    shown.camera = camera_in_window(s.photos, centred, {width - left, height, 0});
+    centred.centre_x = centred.centre_y = 0.5;
+    shown.camera = camera_in_window(s.photos, centred, {area.free_width(), height});
     options.up = s.navigation.up;
     options.views.insert(options.views.begin(), shown);
     WebPageFacts facts;

@@ -210,10 +210,19 @@ constexpr ThemeRow kThemeRows[] = {
     {ImGuiCol_SliderGrab, theme::kGrab},
     {ImGuiCol_SliderGrabActive, theme::kGrab},
     {ImGuiCol_PlotLines, theme::kAccent},
-    {ImGuiCol_PlotHistogram, theme::kAccent},
+    {ImGuiCol_PlotHistogram, theme::kGrab},
     {ImGuiCol_ScrollbarBg, theme::kWindow},
     {ImGuiCol_ScrollbarGrab, theme::kEdge},
     {ImGuiCol_TextSelectedBg, theme::kActive},
+    {ImGuiCol_MenuBarBg, theme::kField},
+    {ImGuiCol_Tab, theme::kField},
+    {ImGuiCol_TabHovered, theme::kHovered},
+    {ImGuiCol_TabActive, theme::kActive},
+    {ImGuiCol_TabUnfocused, theme::kField},
+    {ImGuiCol_TabUnfocusedActive, theme::kActive},
+    {ImGuiCol_TableHeaderBg, theme::kField},
+    {ImGuiCol_TableBorderStrong, theme::kEdge},
+    {ImGuiCol_TableBorderLight, theme::kEdge},
 };
 
 }  // namespace

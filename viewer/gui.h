@@ -6,6 +6,7 @@
 #include <array>
 
 #include "engine/gpu/device.h"
+#include "engine/report/palette.h"
 
 struct GLFWwindow;
 
@@ -47,25 +48,30 @@ class Gui {
 /// the pointer: 2 on some high-DPI desktops, 1 on others.
 float pixels_per_unit(GLFWwindow* window);
 
-// The colours of the panels and of what is drawn over pictures. Text has a contrast of at least 7
-// to 1 on every ground it stands on, and disabled text 4.5 to 1 (WCAG 2.1, 1.4.6 and 1.4.3).
+// The colours of the panels and of what is drawn over pictures, from the palette of reports and
+// pages. Text has a contrast of at least 7 to 1 on every ground it stands on, and disabled text 4.5
+// to 1 (WCAG 2.1, 1.4.6 and 1.4.3).
 
 /// sRGB with alpha, 0 to 1.
 using ThemeColour = std::array<float, 4>;
 
 namespace theme {
 
-inline constexpr ThemeColour kText{0.95f, 0.96f, 0.98f, 1};
-inline constexpr ThemeColour kTextOff{0.75f, 0.78f, 0.83f, 1};
-inline constexpr ThemeColour kWindow{0.086f, 0.094f, 0.110f, 1};
-inline constexpr ThemeColour kField{0.157f, 0.173f, 0.204f, 1};
-inline constexpr ThemeColour kButton{0.196f, 0.231f, 0.298f, 1};
-inline constexpr ThemeColour kHovered{0.173f, 0.290f, 0.455f, 1};
-inline constexpr ThemeColour kActive{0.133f, 0.318f, 0.555f, 1};
-inline constexpr ThemeColour kError{0.482f, 0.098f, 0.118f, 1};
-inline constexpr ThemeColour kEdge{0.310f, 0.337f, 0.392f, 1};
-inline constexpr ThemeColour kAccent{0.357f, 0.659f, 1.0f, 1};
-inline constexpr ThemeColour kGrab{0.196f, 0.420f, 0.690f, 1};  // values are written on it
+constexpr ThemeColour theme_colour(const PaletteColour& c, float alpha = 1) {
+    return {float(c.r) / 255, float(c.g) / 255, float(c.b) / 255, alpha};
+}
+
+inline constexpr ThemeColour kText = theme_colour(palette::kDark.ink);
+inline constexpr ThemeColour kTextOff = theme_colour(palette::kDark.soft);
+inline constexpr ThemeColour kWindow = theme_colour(palette::kDark.page);
+inline constexpr ThemeColour kField = theme_colour(palette::kDark.card);
+inline constexpr ThemeColour kEdge = theme_colour(palette::kDark.line);
+inline constexpr ThemeColour kButton = theme_colour(palette::kButton);
+inline constexpr ThemeColour kHovered = theme_colour(palette::kHovered);
+inline constexpr ThemeColour kActive = theme_colour(palette::kActive);
+inline constexpr ThemeColour kError = theme_colour(palette::kError);
+inline constexpr ThemeColour kAccent = theme_colour(palette::kAccent);
+inline constexpr ThemeColour kGrab = theme_colour(palette::kGrab);  // values are written on it
 
 /// The backgrounds on which text stands.
 inline constexpr std::array kGrounds{kWindow, kField, kButton, kHovered, kActive, kError};

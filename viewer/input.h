@@ -3,31 +3,48 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <glm/glm.hpp>
+#include <optional>
 #include <variant>
 #include <vector>
 
 namespace darb {
 
+/// What can be asked for by a key, a menu or a button; commands.h has the table of them.
 enum class Key {
-    frame_all,    // F
-    level,        // L
-    hide_panels,  // H
-    full_screen,  // F11
-    picture,      // P
-    next_camera,  // ]
-    last_camera,  // [
-    add_key,      // K
-    play,         // space: plays a path, or goes on with a paused training run
-    step,         // . : does one step of a training run, which then pauses
+    open,
+    merge,
+    save,
+    save_page,
+    picture,
+    quit,
+    undo,
+    redo,
+    remove,
+    hide,
+    show_hidden,
     select_all,
     select_none,
-    select_others,  // Ctrl A, D, I
-    hide,
-    show_hidden,  // Ctrl H, U
-    open,         // Ctrl O
-    // 1 to 9, in the order of Tool.
+    select_others,
+    frame_all,
+    level,
+    view_front,
+    view_right,
+    view_top,
+    next_camera,
+    last_camera,
+    compare,
+    show_cameras,
+    show_grid,
+    show_axes,
+    show_picture,
+    show_depth,
+    show_work,
+    show_error,
+    hide_panels,
+    full_screen,
     tool_navigate,
     tool_rectangle,
     tool_lasso,
@@ -37,14 +54,13 @@ enum class Key {
     tool_turn,
     tool_scale,
     tool_measure,
-    remove,  // Delete
-    undo,    // Ctrl Z
-    redo,    // Ctrl Y
-    save,    // Ctrl S
-    quit,    // Ctrl Q
-    help,    // ?
-    escape,  // Esc: leaves full screen, stops playing, cancels loading
+    add_key,
+    play,  // a path, or a training run
+    step,  // of a training run
+    help,
+    escape,
 };
+inline constexpr int kKeyCount = static_cast<int>(Key::escape) + 1;
 
 struct Input {
     double x = 0, y = 0;    // px, pointer
@@ -58,6 +74,24 @@ struct Input {
     bool ahead = false, back = false, to_left = false, to_right = false, rise = false, sink = false;
     std::vector<Key> pressed;
     std::vector<std::filesystem::path> dropped;
+};
+
+/// What of a training run may change while it goes on; 0: as it is.
+struct RunSettings {
+    int iterations = 0;            // of the whole run
+    std::uint32_t max_splats = 0;  // 0 in what a run reports: no limit
+    double max_memory_mib = 0;     // of the device, likewise
+
+    bool operator==(const RunSettings&) const = default;
+};
+
+/// What is asked of the run, between two iterations.
+struct RunWish {
+    std::optional<RunSettings> change = {};
+    bool measures = false;   // held-out photos
+    bool saves = false;      // checkpoint and scene
+    bool stops = false;      // as Ctrl-C does
+    bool publishes = false;  // and leaves a web page
 };
 
 // Requests: what panels, keys and the window ask of the viewer. They wait in a queue, and the
@@ -105,6 +139,9 @@ struct OpenMesh {
 struct MakeMesh {};  // of the scene, as session.mesh_wish says
 struct SaveMesh {};
 struct CloseMesh {};
+struct AskRun {
+    RunWish wish;
+};  // of the training run that is followed
 struct Quit {};
 // Answers to the question that session.leaving asks.
 struct SaveAndLeave {};
@@ -122,9 +159,9 @@ using Request =
                  request::Open, request::ShowEdits, request::Save, request::SavePage,
                  request::LoadPath, request::SavePath, request::ExportPath, request::CancelLoad,
                  request::FindFreeSpace, request::CancelWork, request::PickPoint, request::OpenMesh,
-                 request::MakeMesh, request::SaveMesh, request::CloseMesh, request::Quit,
-                 request::SaveAndLeave, request::Leave, request::Stay, request::ToggleFullScreen,
-                 request::LeaveFullScreen>;
+                 request::MakeMesh, request::SaveMesh, request::CloseMesh, request::AskRun,
+                 request::Quit, request::SaveAndLeave, request::Leave, request::Stay,
+                 request::ToggleFullScreen, request::LeaveFullScreen>;
 using RequestQueue = std::vector<Request>;
 
 template <class Kind>

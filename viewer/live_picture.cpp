@@ -20,7 +20,7 @@ constexpr double kUnchanged_s = 0.12;
 }  // namespace
 
 bool LiveWish::operator==(const LiveWish& o) const {
-    return key == o.key && area.left == o.area.left && panes.lines == o.panes.lines &&
+    return key == o.key && area == o.area && panes.lines == o.panes.lines &&
            panes.difference == o.panes.difference && panes.difference_max == o.panes.difference_max;
 }
 
@@ -52,6 +52,21 @@ std::optional<LiveMade> LivePicture::take() {
     return std::exchange(made_, std::nullopt);
 }
 
+void RunWishes::ask(const std::vector<RunWish>& wishes) {
+    const std::lock_guard lock(mutex_);
+    waiting_.insert(waiting_.end(), wishes.begin(), wishes.end());
+}
+
+std::vector<RunWish> RunWishes::take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(waiting_, {});
+}
+
+bool RunWishes::empty() const {
+    const std::lock_guard lock(mutex_);
+    return waiting_.empty();
+}
+
 LiveDrawer::LiveDrawer(Device& device, std::vector<View> views, const Bounds& bounds)
     : device_(&device), bounds_(bounds), picture_(device), panes_(device) {
     photos_.views = std::move(views);
@@ -72,9 +87,10 @@ bool LiveDrawer::draw(const GpuSplats& splats, LiveChange change, LivePicture& t
     drawn_ = wish;
     whole_ = whole;
     drawn_at_ = LiveClock::now();
-    next_ = drawn_at_ +
-            std::chrono::duration_cast<LiveClock::duration>(
-                std::chrono::duration<double>(std::max(kBetween_s, made.ms / 1000 / kDrawnShare)));
+    // what was compiled for it is compiled once
+    const double share_s = compiled_ ? 0 : made.ms / 1000 / kDrawnShare;
+    next_ = drawn_at_ + std::chrono::duration_cast<LiveClock::duration>(
+                            std::chrono::duration<double>(std::max(kBetween_s, share_s)));
     to.give(std::move(made));
     return true;
 }

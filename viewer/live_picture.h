@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "viewer/input.h"
 #include "viewer/pane_pictures.h"
 #include "viewer/photo_compare.h"
 #include "viewer/picture_pacing.h"
@@ -67,6 +68,19 @@ class LivePicture {
     mutable std::mutex mutex_;
     std::optional<LiveWish> wish_;
     std::optional<LiveMade> made_;
+};
+
+/// What is asked of a run, as it waits for the run to take it. Any thread may use it.
+class RunWishes {
+  public:
+    void ask(const std::vector<RunWish>& wishes);
+    /// All of them in their order; none are left.
+    std::vector<RunWish> take();
+    bool empty() const;
+
+  private:
+    mutable std::mutex mutex_;
+    std::vector<RunWish> waiting_;
 };
 
 /// How much the splats have changed since the last picture. `seldom`: they change all the time, and

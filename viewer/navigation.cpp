@@ -92,6 +92,23 @@ void Navigation::set_up(const glm::dvec3& new_up) {
     eye = centre - distance * forward();
 }
 
+void Navigation::view_from(const glm::dvec3& direction) {
+    constexpr double kOffPole = 1e-4;  // rad
+    const glm::dvec3 centre = pivot();
+    glm::dvec3 ahead = -glm::normalize(direction);
+    if (glm::length(glm::cross(ahead, up)) < kOffPole) {
+        glm::dvec3 side = right() - glm::dot(right(), up) * up;
+        if (glm::length(side) < kOffPole) side = glm::cross(up, glm::dvec3(up.y, up.z, up.x));
+        side = glm::normalize(side);
+        // where the view comes from ahead of the eye, the picture's top stays the way ahead
+        ahead = glm::normalize(ahead + kOffPole * glm::cross(up, side));
+    }
+    axes[2] = ahead;
+    axes[0] = glm::normalize(glm::cross(ahead, up));
+    orthonormalise(axes);
+    eye = centre - distance * forward();
+}
+
 void Navigation::level() {
     glm::dvec3 side = glm::cross(forward(), up);
     if (glm::length(side) < 1e-6) {  // where the view is straight up or down, any right will do
@@ -115,7 +132,7 @@ Camera Navigation::camera(int width_px, int height_px) const {
     c.height = height_px;
     c.fx = c.fy = 0.5 * height_px / std::tan(fov_y / 2);
     c.cx = centre_x * width_px;
-    c.cy = 0.5 * height_px;
+    c.cy = centre_y * height_px;
     c.rotation = glm::transpose(axes);
     c.translation = -(c.rotation * eye);
     return c;

@@ -17,6 +17,7 @@ struct Navigation {
     double distance = 3;       // world, from the eye to the pivot in front of it
     double fov_y = glm::radians(50.0);  // rad, full height
     double centre_x = 0.5;              // share of the window's width left of the optical axis
+    double centre_y = 0.5;              // share of its height above that
 
     glm::dvec3 right() const { return axes[0]; }
     glm::dvec3 down() const { return axes[1]; }
@@ -49,8 +50,12 @@ struct Navigation {
     void level();
     /// Takes pose and field of view from a photo's camera.
     void take(const Camera& camera);
-    /// The pinhole camera for a window, with its principal point at half the height and centre_x of
-    /// the width.
+    /// Looks at the pivot from this direction, a unit vector away from it; the distance stays.
+    /// Where it is that of `up` or its opposite, the view is off it by 0.006 degrees, so that it
+    /// has a right side, which is as near as can be to the one before.
+    void view_from(const glm::dvec3& direction);
+    /// The pinhole camera for a window, with its principal point at centre_x of the width and
+    /// centre_y of the height.
     Camera camera(int width_px, int height_px) const;
 
   private:

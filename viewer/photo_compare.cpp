@@ -12,17 +12,17 @@ namespace darb {
 
 Camera camera_in_window(const Photos& photos, const Navigation& free, const WindowArea& area) {
     if (photos.current < 0) return free.camera(area.width, area.height);
-    return fitted(photos.view().camera, area.width, area.height, area.left);
+    return fitted(photos.view().camera, area);
 }
 
 PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, const WindowArea& area) {
     PhotoOverlay o;
     if (photos.current < 0 || photos.loaded != photos.current) return o;
     const Camera& of = photos.view().camera;
-    const double share = double(camera.width) / area.width, left = share * area.left;
-    o.scale = fit_scale(of, area.width - area.left, area.height) * share;
-    o.x = left + 0.5 * (camera.width - left - o.scale * of.width);
-    o.y = 0.5 * (camera.height - o.scale * of.height);
+    const double share = double(camera.width) / area.width;
+    o.scale = fit_scale(of, area.free_width(), area.free_height()) * share;
+    o.x = share * area.left + 0.5 * (share * area.free_width() - o.scale * of.width);
+    o.y = share * area.top + 0.5 * (camera.height - share * area.top - o.scale * of.height);
     o.photo = &photos.buffer;
     o.width = photos.width;
     o.height = photos.height;
@@ -36,12 +36,12 @@ bool photo_beside(const Photos& photos, const DisplaySettings& display) {
 
 Strip compared_strip(const Photos& photos, const DisplaySettings& display, const WindowArea& area) {
     const double width = std::max(area.width, 1);
-    double begin = area.left, end = width;
+    double begin = area.left, end = width - area.right;
     if (photo_beside(photos, display)) {
         const Camera& of = photos.view().camera;
-        const double free = width - area.left;
         const double beyond =
-            std::max(0.0, free - fit_scale(of, static_cast<int>(free), area.height) * of.width);
+            std::max(0.0, area.free_width() -
+                              fit_scale(of, area.free_width(), area.free_height()) * of.width);
         begin += beyond / 2;
         end -= beyond / 2;
     }

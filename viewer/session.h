@@ -18,6 +18,7 @@
 #include "viewer/camera_path.h"
 #include "viewer/display.h"
 #include "viewer/edit.h"
+#include "viewer/guides.h"
 #include "viewer/input.h"
 #include "viewer/mesh_work.h"
 #include "viewer/navigation.h"
@@ -26,6 +27,7 @@
 #include "viewer/picture_pacing.h"
 #include "viewer/saved_files.h"
 #include "viewer/scene.h"
+#include "viewer/thumbnails.h"
 #include "viewer/tools.h"
 
 namespace darb {
@@ -51,8 +53,21 @@ struct TrainingCurves {
     int iteration = 0, last_iteration = 0;
     std::vector<float> loss, psnr_db, splats;  // smoothed, and thinned out as they get long
     std::vector<float> held_out_psnr_db;       // one value for each evaluation
+    std::vector<int> held_out_at;              // iterations of these
+    double seconds_left = 0;                   // 0: not known yet
+    std::uint64_t memory_bytes = 0;            // of the device, in use
+    RunSettings settings;                      // as they are
+    std::vector<std::string> said;             // what became of wishes, latest last
     bool paused = false;
     int steps_to_go = 0;  // used while paused
+};
+
+/// What a user types about a run before it is asked for, and what was asked and not yet passed on.
+struct RunDesk {
+    std::optional<RunSettings> typed;  // while it differs from what the run has
+    bool stopping = false;             // asks how to stop
+    bool stopped = false;              // the run was asked to stop
+    std::vector<RunWish> wishes;
 };
 
 struct FrameTimes {
@@ -118,11 +133,26 @@ struct ShownState {
     Photos photos;
     PathState path;
     TrainingCurves training;
+    RunDesk run_desk;
+    Bounds run_bounds;          // of the run that is followed
     std::string title;          // what is shown, for a window's title
     int sh_degree = 0;          // highest degree of the scene or the run
     bool up_is_guess = false;   // neither the file nor the user says what is up
     bool save_upright = false;  // turns a saved scene so that up becomes -y
 };
+
+/// What the properties show: a tab each.
+enum class Tab { training, scene, view, camera, splats, mesh, measure, film };
+
+/// What the user last worked on, from which the tab follows.
+struct Worked {
+    Tool tool = Tool::navigate;
+    bool selected = false, mesh = false, run = false;
+    int camera = -1;
+    const void* scene = nullptr;
+};
+/// The tab of what has changed; nothing where nothing has that has a tab.
+std::optional<Tab> tab_of_change(const Worked& before, const Worked& now);
 
 /// How it is painted (viewer/painter.h).
 struct PaintedState {
@@ -133,6 +163,10 @@ struct PaintedState {
     std::string device_name;
     float gui_scale = 1;
     bool panels = true;
+    GuideState guides;
+    std::unique_ptr<Thumbnails> thumbnails;  // of photos.views
+    Tab tab = Tab::scene;
+    Worked worked;
 };
 
 /// What was asked, and what is answered (viewer/controller.h).
@@ -148,6 +182,9 @@ struct AskedState {
     std::deque<Toast> toasts;  // latest last
     int told = 0;              // counts all toasts so far
     bool help = false;         // whether the list of keys is shown
+    bool close_menus = false;  // in the next frame
+    /// Called from other threads when there is something new to show; may be empty.
+    std::function<void()> wake;
 
     void ask(const Request& request) { requests.push_back(request); }
     /// Shows the text in the status line and over the picture.
@@ -170,9 +207,6 @@ inline bool unsaved_mesh(const ShownState& s) {
 /// Draws the panels of one frame; progress, errors and questions also where session.panels is off.
 /// It needs an ImGui frame, whose coordinates it uses.
 void draw_panels(Session& session);
-/// Width in px that the side panel takes from the left of the window where it was not moved; 0:
-/// hidden.
-float panel_width(const Session& session);
 /// A window of this size, px, without what the panel covers, where enough room is left beside it.
 WindowArea free_area(const Session& session, int width, int height);
 

@@ -10,6 +10,7 @@
 #include "engine/raster/frame_view.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_model.h"
+#include "viewer/guides.h"
 
 namespace darb {
 
@@ -553,12 +554,9 @@ void SplatPicture::record_uploads(Flight& flight) {
 void SplatPicture::record_depth_colours(const Job& job, Commands& commands) {
     const std::uint32_t splats = job.splats->count();
     if (splats == 0) return;
-    const Camera& camera = job.camera;
-    const double depth =
-        glm::dot(glm::transpose(camera.rotation)[2], bounds_.centre - camera.centre());
-    const gpu::DepthLightArgs args{splats,
-                                   static_cast<float>(std::max(0.0, depth - 1.5 * bounds_.radius)),
-                                   static_cast<float>(std::max(depth, 0.0) + 1.5 * bounds_.radius)};
+    const auto [near_depth, far_depth] = depth_range(job.camera, bounds_);
+    const gpu::DepthLightArgs args{splats, static_cast<float>(near_depth),
+                                   static_cast<float>(far_depth)};
     commands.pass("depth colours");
     const Groups g = groups_for(splats);
     const ProjectedSplats& projected = job.slot->buffers->frame().splats;

@@ -18,15 +18,15 @@ double fit_scale(const Camera& camera, int width, int height) {
     return std::min(double(width) / camera.width, double(height) / camera.height);
 }
 
-Camera fitted(const Camera& camera, int width, int height, int left) {
-    const double s = fit_scale(camera, width - left, height);
+Camera fitted(const Camera& camera, const WindowArea& area) {
+    const double s = fit_scale(camera, area.free_width(), area.free_height());
     Camera c = camera;
     c.fx *= s;
     c.fy *= s;
-    c.cx = c.cx * s + left + 0.5 * (width - left - s * camera.width);
-    c.cy = c.cy * s + 0.5 * (height - s * camera.height);
-    c.width = width;
-    c.height = height;
+    c.cx = c.cx * s + area.left + 0.5 * (area.free_width() - s * camera.width);
+    c.cy = c.cy * s + area.top + 0.5 * (area.free_height() - s * camera.height);
+    c.width = area.width;
+    c.height = area.height;
     return c;
 }
 

@@ -8,14 +8,15 @@
 
 #include "engine/scene/camera.h"
 #include "engine/scene/splat_model.h"
+#include "viewer/photo_compare.h"
 
 namespace darb {
 
 /// How many px of the window each px of the photo takes so that the whole photo is seen.
 double fit_scale(const Camera& camera, int width, int height);
-/// The photo's camera with its frame centred in the window, right of `left` px. What lies beyond
-/// the frame is shown too.
-Camera fitted(const Camera& camera, int width, int height, int left = 0);
+/// The photo's camera with its frame centred in what the panels leave of the window. What lies
+/// beyond the frame is shown too.
+Camera fitted(const Camera& camera, const WindowArea& area);
 
 /// The pixel at which the point is seen; nothing behind the camera.
 inline std::optional<glm::dvec2> pixel_of(const Camera& c, const glm::dvec3& world) {

@@ -29,6 +29,8 @@ Viewer::Viewer(Device& device, const ViewerOptions& options, GLFWwindow* window)
       controller_(device, session_, document_, painter_) {
     session_.device_name = device.info().name;
     session_.gui_scale = panel_scale(options);
+    session_.open_dialog.recent = document_.recent();
+    session_.wake = options.wake;
 }
 
 double Viewer::frame(const Input& input, int width, int height, bool full) {

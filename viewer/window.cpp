@@ -3,6 +3,7 @@
 #include "viewer/window.h"
 
 #include <GLFW/glfw3.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <atomic>
@@ -12,6 +13,7 @@
 #include <utility>
 
 #include "engine/core/error.h"
+#include "viewer/commands.h"
 #include "viewer/swapchain.h"
 
 namespace darb {
@@ -27,61 +29,33 @@ std::string last_error() {
     return text != nullptr ? text : "unknown";
 }
 
-std::optional<Key> key_for(int key, bool control) {
-    if (control) switch (key) {
-            case GLFW_KEY_Z:
-                return Key::undo;
-            case GLFW_KEY_Y:
-                return Key::redo;
-            case GLFW_KEY_S:
-                return Key::save;
-            case GLFW_KEY_Q:
-                return Key::quit;
-            case GLFW_KEY_A:
-                return Key::select_all;
-            case GLFW_KEY_D:
-                return Key::select_none;
-            case GLFW_KEY_I:
-                return Key::select_others;
-            case GLFW_KEY_H:
-                return Key::hide;
-            case GLFW_KEY_U:
-                return Key::show_hidden;
-            case GLFW_KEY_O:
-                return Key::open;
-            default:
-                return {};
-        }
-    if (key >= GLFW_KEY_1 && key <= GLFW_KEY_9)
-        return static_cast<Key>(static_cast<int>(Key::tool_navigate) + key - GLFW_KEY_1);
+// GLFW names printable keys by their characters on a US keyboard.
+std::string key_name(int key) {
+    if (key == GLFW_KEY_SPACE) return "Space";
+    if (key > GLFW_KEY_SPACE && key <= GLFW_KEY_GRAVE_ACCENT)
+        return std::string(1, static_cast<char>(key));
+    if (key >= GLFW_KEY_F1 && key <= GLFW_KEY_F12) return fmt::format("F{}", key - GLFW_KEY_F1 + 1);
+    if (key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_9)
+        return fmt::format("Num {}", key - GLFW_KEY_KP_0);
     switch (key) {
-        case GLFW_KEY_F:
-            return Key::frame_all;
-        case GLFW_KEY_L:
-            return Key::level;
-        case GLFW_KEY_H:
-            return Key::hide_panels;
-        case GLFW_KEY_F11:
-            return Key::full_screen;
-        case GLFW_KEY_P:
-            return Key::picture;
-        case GLFW_KEY_RIGHT_BRACKET:
-            return Key::next_camera;
-        case GLFW_KEY_LEFT_BRACKET:
-            return Key::last_camera;
-        case GLFW_KEY_K:
-            return Key::add_key;
-        case GLFW_KEY_SPACE:
-            return Key::play;
-        case GLFW_KEY_PERIOD:
-            return Key::step;
         case GLFW_KEY_DELETE:
-            return Key::remove;
+            return "Delete";
+        case GLFW_KEY_BACKSPACE:
+            return "Backspace";
+        case GLFW_KEY_HOME:
+            return "Home";
         case GLFW_KEY_ESCAPE:
-            return Key::escape;
+            return "Esc";
         default:
-            return {};
+            return "";
     }
+}
+
+std::optional<Key> key_for(int key, int mods) {
+    const std::string name = key_name(key);
+    if (name.empty()) return {};
+    return command_of(((mods & GLFW_MOD_CONTROL) != 0 ? "Ctrl+" : "") +
+                      std::string((mods & GLFW_MOD_SHIFT) != 0 ? "Shift+" : "") + name);
 }
 
 struct GlfwWindow {
@@ -185,8 +159,7 @@ void ViewerWindow::State::install_callbacks() {
         s.dirty = true;
         if (action != GLFW_PRESS) return;
         if (bool* held = s.held_key(key)) *held = true;  // also when it is let go before the frame
-        if (const auto k = key_for(key, (mods & GLFW_MOD_CONTROL) != 0))
-            s.input.pressed.push_back(*k);
+        if (const auto k = key_for(key, mods)) s.input.pressed.push_back(*k);
     });
     glfwSetMouseButtonCallback(w, [](GLFWwindow* from, int button, int action, int) {
         State& s = of(from);
@@ -208,7 +181,8 @@ void ViewerWindow::State::install_callbacks() {
         of(from).dirty = true;
     });
     glfwSetCharCallback(w, [](GLFWwindow* from, unsigned character) {  // by whatever key has it
-        if (character == '?') of(from).input.pressed.push_back(Key::help);
+        if (const auto k = character == '?' ? command_of("?") : std::nullopt)
+            of(from).input.pressed.push_back(*k);
         of(from).dirty = true;
     });
     glfwSetWindowRefreshCallback(w, [](GLFWwindow* from) { of(from).dirty = true; });

@@ -22,6 +22,7 @@
 #include "engine/raster/forward_options.h"
 #include "engine/raster/kernel_constants.h"
 #include "engine/report/html.h"
+#include "engine/report/palette.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/subject.h"
 
@@ -216,7 +217,13 @@ void add_payload(const PageSplats& packed, std::size_t payload_bytes, Json& scen
 std::string style(const glm::vec3& background) {
     const glm::ivec3 bytes(glm::round(glm::clamp(background, 0.0f, 1.0f) * 255.0f));
     return filled(page_file(kFolder + "page.css"),
-                  {{"background", fmt::format("rgb({},{},{})", bytes.r, bytes.g, bytes.b)}});
+                  {{"background", fmt::format("rgb({},{},{})", bytes.r, bytes.g, bytes.b)},
+                   {"ink", css_colour(palette::kDark.ink)},
+                   {"soft", css_colour(palette::kDark.soft)},
+                   {"line", css_colour(palette::kDark.line)},
+                   {"page", css_colour(palette::kDark.page)},
+                   {"button", css_colour(palette::kButton)},
+                   {"accent", css_colour(palette::kAccent)}});
 }
 
 }  // namespace

@@ -11,15 +11,9 @@
 #include <utility>
 
 #include "engine/report/html.h"
+#include "engine/report/palette.h"
 
 namespace darb {
-
-const std::vector<std::string>& series_colours() {
-    static const std::vector<std::string> colours{
-        "#2563b0", "#d0571b", "#2a8a57", "#8650b5", "#b58a00", "#1596a8", "#b23a6b",
-        "#6b7280", "#7a5a3a", "#4a4ac0", "#7fb0e0", "#e8a33d", "#0f5132", "#d88bd0"};
-    return colours;
-}
 
 void Drawing::add_path(std::string style, std::vector<PathStep> path, int series,
                        std::string hint) {
@@ -139,10 +133,11 @@ struct Look {
 };
 
 Look look_of(const std::string& style, int series) {
-    const std::string ink = "#1c1f24", soft = "#667080", line = "#dfe3e8";
-    const std::vector<std::string>& colours = series_colours();
+    const std::string ink = css_colour(palette::kLight.ink), soft = css_colour(palette::kLight.soft),
+                      line = css_colour(palette::kLight.line);
+    const auto& colours = palette::kLight.series;
     const std::string colour =
-        series < 0 ? ink : colours[static_cast<std::size_t>(series) % colours.size()];
+        series < 0 ? ink : css_colour(colours[static_cast<std::size_t>(series) % colours.size()]);
     if (style == "line") return {"", colour, 1.8};
     if (style == "area") return {colour, "#ffffff", 0.6};
     if (style == "band") return {colour, "", 1, 0.18};
@@ -178,7 +173,7 @@ std::string svg_file(const Drawing& drawing) {
     std::string css = "text{font-family:Helvetica,Arial,sans-serif}\n";
     for (const char* style : {"grid", "axis", "whisker", "name", "label", "tick"})
         css += rule(std::string(".") + style, look_of(style, -1));
-    for (int s = 0; s < static_cast<int>(series_colours().size()); ++s) {
+    for (int s = 0; s < static_cast<int>(palette::kLight.series.size()); ++s) {
         for (const char* style : {"line", "area", "band"})
             css += rule(fmt::format(".{}.s{}", style, s), look_of(style, s));
         css += rule(fmt::format("circle.s{}", s), look_of("", s));

@@ -9,9 +9,6 @@
 
 namespace darb {
 
-/// Colours of the series on white, as #rrggbb: s0, s1, ... of the page's style.
-const std::vector<std::string>& series_colours();
-
 enum class Anchor { start, middle, end };
 
 struct PathStep {

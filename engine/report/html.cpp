@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "engine/report/drawing.h"
+#include "engine/report/palette.h"
 
 namespace darb {
 
@@ -67,13 +67,7 @@ std::string format_number(double v, int decimals) {
 
 namespace {
 
-constexpr const char* kStyle = R"css(
-:root{--ink:#1c1f24;--soft:#667080;--line:#dfe3e8;--page:#fff;--card:#f6f7f9}
-@media screen and (prefers-color-scheme:dark){:root{--ink:#e6e8eb;--soft:#98a2b0;--line:#333a44;
---page:#14171b;--card:#1d2127;--s0:#6ea8f0;--s1:#f0935a;
---s2:#5cc48d;--s3:#bb8ce6;--s4:#e0bd4a;--s5:#57cbdc;--s6:#ea7aa7;--s7:#a3abb8;--s8:#c49a72;--s9:#9393f5;
---s10:#2f6db3;--s11:#b3701a;--s12:#b7f0cf;--s13:#a04f97}}
-*{box-sizing:border-box}
+constexpr const char* kStyle = R"css(*{box-sizing:border-box}
 body{margin:0 auto;max-width:1080px;padding:2rem 1.25rem 4rem;background:var(--page);color:var(--ink);
 font:15px/1.5 system-ui,sans-serif}
 h1{font-size:1.5rem;margin:0;overflow-wrap:anywhere}h2{font-size:1.05rem;margin:2.2rem 0 .7rem}
@@ -87,20 +81,6 @@ svg.bars{max-width:900px;grid-column:1/-1}
 svg text{fill:var(--ink);font:12px system-ui,sans-serif}svg .name{font-weight:600;font-size:13px}
 svg .tick,svg .label{fill:var(--soft);font-size:11px}
 .grid{stroke:var(--line)}.axis{stroke:var(--soft);fill:none}.line{fill:none;stroke-width:1.8;stroke-linejoin:round}
-.line.s0{stroke:var(--s0)}circle.s0,.band.s0,.area.s0{fill:var(--s0)}i.s0{background:var(--s0)}
-.line.s1{stroke:var(--s1)}circle.s1,.band.s1,.area.s1{fill:var(--s1)}i.s1{background:var(--s1)}
-.line.s2{stroke:var(--s2)}circle.s2,.band.s2,.area.s2{fill:var(--s2)}i.s2{background:var(--s2)}
-.line.s3{stroke:var(--s3)}circle.s3,.band.s3,.area.s3{fill:var(--s3)}i.s3{background:var(--s3)}
-.line.s4{stroke:var(--s4)}circle.s4,.band.s4,.area.s4{fill:var(--s4)}i.s4{background:var(--s4)}
-.line.s5{stroke:var(--s5)}circle.s5,.band.s5,.area.s5{fill:var(--s5)}i.s5{background:var(--s5)}
-.line.s6{stroke:var(--s6)}circle.s6,.band.s6,.area.s6{fill:var(--s6)}i.s6{background:var(--s6)}
-.line.s7{stroke:var(--s7)}circle.s7,.band.s7,.area.s7{fill:var(--s7)}i.s7{background:var(--s7)}
-.line.s8{stroke:var(--s8)}circle.s8,.band.s8,.area.s8{fill:var(--s8)}i.s8{background:var(--s8)}
-.line.s9{stroke:var(--s9)}circle.s9,.band.s9,.area.s9{fill:var(--s9)}i.s9{background:var(--s9)}
-.line.s10{stroke:var(--s10)}circle.s10,.band.s10,.area.s10{fill:var(--s10)}i.s10{background:var(--s10)}
-.line.s11{stroke:var(--s11)}circle.s11,.band.s11,.area.s11{fill:var(--s11)}i.s11{background:var(--s11)}
-.line.s12{stroke:var(--s12)}circle.s12,.band.s12,.area.s12{fill:var(--s12)}i.s12{background:var(--s12)}
-.line.s13{stroke:var(--s13)}circle.s13,.band.s13,.area.s13{fill:var(--s13)}i.s13{background:var(--s13)}
 .area{stroke:var(--card);stroke-width:.6}.band{fill-opacity:.18}.whisker{stroke:var(--ink);stroke-width:1.6;fill:none}
 .legend{display:flex;flex-wrap:wrap;gap:.2rem 1rem;margin:.5rem 0;color:var(--soft)}
 .legend i{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.35em;
@@ -124,22 +104,42 @@ th,td{padding-right:.5rem}.plots{grid-template-columns:1fr 1fr}.area,circle,.lin
 .parts{display:grid;grid-template-columns:1fr 1fr;gap:.5rem;color:var(--soft);font-size:.85rem}
 )css";
 
-std::string light_colours() {
-    std::string css;
-    for (std::size_t s = 0; s < series_colours().size(); ++s)
-        css += fmt::format("--s{}:{};", s, series_colours()[s]);
+// The variables that the style names, without braces.
+std::string variables(const Palette& p) {
+    std::string css =
+        fmt::format("--ink:{};--soft:{};--line:{};--page:{};--card:{}", css_colour(p.ink),
+                    css_colour(p.soft), css_colour(p.line), css_colour(p.page), css_colour(p.card));
+    for (std::size_t i = 0; i < p.series.size(); ++i)
+        css += fmt::format(";--s{}:{}", i, css_colour(p.series[i]));
+    return css;
+}
+
+std::string style() {
+    std::string css =
+        fmt::format("\n:root{{{}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{}}}}}\n",
+                    variables(palette::kLight), variables(palette::kDark));
+    css += kStyle;
+    for (std::size_t i = 0; i < palette::kLight.series.size(); ++i)
+        css += fmt::format(
+            ".line.s{0}{{stroke:var(--s{0})}}circle.s{0},.band.s{0},.area.s{0}{{fill:var(--s{0})}}"
+            "i.s{0}{{background:var(--s{0})}}\n",
+            i);
     return css;
 }
 
 }  // namespace
+
+std::string css_colour(const PaletteColour& c) {
+    return fmt::format("#{:02x}{:02x}{:02x}", c.r, c.g, c.b);
+}
 
 std::string html_page(const std::string& title, const std::string& subtitle,
                       const std::string& body) {
     std::string html = "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>\n";
     html += "<meta name='viewport' content='width=device-width,initial-scale=1'>\n";
     html += "<meta name='color-scheme' content='light dark'>\n";
-    html += fmt::format("<title>{}</title>\n<style>\n:root{{{}}}{}</style></head><body>\n",
-                        html_escape(title), light_colours(), kStyle);
+    html += fmt::format("<title>{}</title>\n<style>{}</style></head><body>\n", html_escape(title),
+                        style());
     html += fmt::format("<h1>{}</h1>\n<p class='soft'>{}</p>\n", html_escape(title),
                         html_escape(subtitle));
     return html + body + "</body></html>\n";

@@ -24,6 +24,11 @@
 #define MESH_LARGE_GROUPS 64u  // workgroups that share all large faces, each for a part
 #define MESH_PARTS 8u
 
+// Colours of a heat map from 0 to 1, evenly apart, as values of this type.
+#define HEAT_STOPS(v)                                                                 \
+    v(0.0, 0.0, 0.02), v(0.34, 0.06, 0.43), v(0.73, 0.21, 0.33), v(0.98, 0.56, 0.04), \
+        v(0.99, 1.0, 0.75)
+
 #ifdef __cplusplus
 namespace darb::gpu {
 #endif

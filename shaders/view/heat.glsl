@@ -3,8 +3,7 @@
 
 // Black, violet, red, orange, pale yellow: from dark to light, so that it also reads in grey.
 vec3 heat(float t) {
-    const vec3 stops[5] = vec3[](vec3(0.0, 0.0, 0.02), vec3(0.34, 0.06, 0.43), vec3(0.73, 0.21, 0.33),
-                                 vec3(0.98, 0.56, 0.04), vec3(0.99, 1.0, 0.75));
+    const vec3 stops[5] = vec3[](HEAT_STOPS(vec3));
     const float x = clamp(t, 0.0, 1.0) * 4.0;
     const int i = min(int(x), 3);
     return mix(stops[i], stops[i + 1], x - float(i));

@@ -18,7 +18,9 @@ TEST_F(LiveViewTest, Run_pauses_steps_and_goes_on_when_the_window_is_closed_slow
         folder_ / "train.log");
     const ImageU8 empty(kDisplayWidth, kDisplayHeight, 3);
     ASSERT_TRUE(changes_from(empty, 100)) << log("train.log");
-    xdo({"mousemove", "600", "400", "key", "space"});
+    xdo({"search", "--name", "darb", "windowsize", "800", "600"});  // with the panels in sight
+    settled();
+    xdo({"mousemove", "250", "400", "key", "space"});
     ImageU8 paused = settled();
     int same = 0;  // a run that compiles shows nothing new for a while either
     EXPECT_TRUE(eventually([&] {

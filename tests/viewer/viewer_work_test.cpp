@@ -342,7 +342,7 @@ TEST_F(ViewerWork, A_page_opens_without_the_panels_offset) {
     frames_all.pressed = {Key::frame_all};
     wide_frame({});
     wide_frame(frames_all);
-    ASSERT_GT(s.navigation.centre_x, 0.5) << "beside the panel";
+    ASSERT_LT(s.navigation.centre_x, 0.5) << "beside the panel";
     s.save_file = folder_ / "page.ply";
     s.ask(request::SavePage{});
     wide_frame({});

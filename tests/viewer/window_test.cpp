@@ -229,16 +229,36 @@ TEST_F(WindowTest, Full_screen_and_back_slow) {
     EXPECT_TRUE(shows(wanted)) << "differs by " << largest_difference(window(), wanted);
 }
 
-// At twice the dots per inch the side panel, 330 px wide at 96, covers x = 500.
+// At twice the dots per inch the properties, 350 px wide at 96, cover x = 400.
 TEST_F(WindowTest, Panels_grow_with_the_dots_per_inch_slow) {
     const ImageU8 bare = headless(folder_ / "scene.ply", {"-w"}, kDisplayWidth, kDisplayHeight);
     set_display_dpi(192);
     start({"-w"}, "800x600");
     EXPECT_TRUE(eventually([&] {
         const ImageU8 now = screen();
-        return now.at(720, 590, 0) == bare.at(720, 590, 0) && now.at(500, 24, 0) < 100;
+        return now.at(150, 590, 0) == bare.at(150, 590, 0) && now.at(400, 590, 0) < 100;
     })) << log("view.log");
-    EXPECT_GT(bare.at(500, 24, 0), 120);
+    EXPECT_GT(bare.at(400, 590, 0), 120);
+}
+
+// What a hand does first: a menu, a tool of the toolbar, an axis in the corner, the grid.
+TEST_F(WindowTest, Menus_toolbar_axes_and_grid_are_clicked_slow) {
+    start({}, "800x600");
+    xdo({"mousemove", "250", "500"});
+    const ImageU8 before = settled();
+    xdo({"mousemove", "147", "11", "click", "1"});
+    ASSERT_TRUE(changes_from(before, 50)) << "the menu View";
+    xdo({"key", "Escape", "mousemove", "250", "500"});
+    ASSERT_TRUE(shows(before)) << "the menu is closed";
+    xdo({"mousemove", "22", "87", "click", "1", "mousemove", "250", "500"});
+    EXPECT_TRUE(changes_from(before, 50)) << "the rectangle of the toolbar";
+    xdo({"key", "1"});
+    settled();
+    xdo({"key", "g"});
+    const ImageU8 gridded = settled();
+    EXPECT_GT(largest_difference(gridded, before), 20) << "the grid";
+    xdo({"mousemove", "436", "85", "click", "1"});
+    EXPECT_TRUE(changes_from(gridded, 50)) << "the axis x";
 }
 
 // Each format in turn dropped on one running viewer; between them a file that is none.

@@ -160,7 +160,7 @@ Report paper_report(const CleanFlags& flags, const Clutter& clutter,
     const auto add = [&](const ClutterOfRule& rule, bool ranked) {
         const double count = double(count_of(rule.set));
         table.rows.push_back(
-            {{rule.name, count, 100 * count / double(rule.set.size()), 100 * rule.light}, ranked});
+            {{rule.rule, count, 100 * count / double(rule.set.size()), 100 * rule.light}, ranked});
     };
     for (const ClutterOfRule& rule : clutter.rules) add(rule, true);
     if (clutter.rules.size() > 1) add(clutter.together, false);

@@ -66,6 +66,8 @@ struct LiveView::State {
     TrainingCurves training;  // what the run reports; pause and steps are the user's
     std::optional<LiveScene> scene;
     std::filesystem::path model;
+    std::string last_words;  // once the run is over
+    RunWishes wishes;
     int version = 0;  // version of `training`
     bool closed = false, finished = false;
     std::atomic<bool> leave{false};  // set when the run failed
@@ -101,7 +103,7 @@ void LiveView::warn(const std::string& reason) {
     state_.reset();
 }
 
-double LiveView::show(const LiveStep& step) {
+LiveAnswer LiveView::show(const LiveStep& step) {
     if (!state_) return 0;
     State& s = *state_;
     std::unique_lock lock(s.mutex);
@@ -120,6 +122,7 @@ double LiveView::show(const LiveStep& step) {
     } catch (const std::exception& e) {
         failure = e.what();
     }
+    LiveAnswer answer = take_wishes(paused_s);
     lock.lock();
     const bool closed = s.closed;
     if (closed) failure = s.failure;
@@ -128,7 +131,27 @@ double LiveView::show(const LiveStep& step) {
         warn(failure);
     else if (closed)
         state_.reset();
-    return paused_s;
+    return answer;
+}
+
+LiveAnswer LiveView::take_wishes(double paused_s) {
+    State& s = *state_;
+    LiveAnswer answer(paused_s);
+    const RunSettings now = [&] {
+        const std::lock_guard lock(s.mutex);
+        return s.training.settings;
+    }();
+    for (const RunWish& wish : s.wishes.take()) {
+        if (wish.change) answer.changes.push_back(change_of(*wish.change, now));
+        answer.measures |= wish.measures;
+        answer.saves |= wish.saves;
+        answer.stops |= wish.stops;
+        publishes_ |= wish.stops && wish.publishes;
+        answer.again = true;
+    }
+    const std::lock_guard lock(s.mutex);
+    answer.again &= s.training.paused && s.training.steps_to_go == 0;
+    return answer;
 }
 
 // Pictures go on while paused, because the user may look around.
@@ -138,7 +161,7 @@ double LiveView::wait_while_paused(const LiveStep& step) {
     for (bool waited = false;; waited = true) {
         std::unique_lock lock(s.mutex);
         const bool steps = s.training.steps_to_go > 0;
-        if (s.closed || s.stop || !s.training.paused || steps) {
+        if (s.closed || s.stop || !s.training.paused || steps || !s.wishes.empty()) {
             if (steps) --s.training.steps_to_go;
             return waited ? seconds_since(start) : 0;
         }
@@ -149,13 +172,14 @@ double LiveView::wait_while_paused(const LiveStep& step) {
     }
 }
 
-void LiveView::finish(const std::filesystem::path& model) {
+void LiveView::finish(const std::filesystem::path& model, const std::string& said) {
     if (!state_) return;
     State& s = *state_;
     {
         const std::lock_guard lock(s.mutex);
         s.finished = true;
         s.model = model;
+        s.last_words = said;
     }
     s.wake();
     s.thread.join();
@@ -197,6 +221,7 @@ std::unique_ptr<LiveView> LiveSystem::open(Device& device, const Dataset& datase
 
 namespace {
 
+constexpr double kMiB = 1024.0 * 1024.0;
 constexpr size_t kLongestCurve = 1000;
 constexpr std::size_t kPointsLookedAt = 20'000;
 constexpr float kSmoothing = 0.05f;  // for loss and PSNR, which jump from photo to photo
@@ -227,8 +252,17 @@ Bounds bounds_of(const Dataset& dataset) {
 void LiveCurves::add(const LiveStep& step, TrainingCurves& t) {
     t.iteration = step.iteration;
     t.last_iteration = step.last_iteration;
+    t.seconds_left = step.seconds_left;
+    t.memory_bytes = step.memory_bytes;
+    t.settings = settings_of(step.options);
+    t.said = step.said;
+    for (size_t e = t.held_out_psnr_db.size(); e < step.evaluations.size(); ++e) {
+        t.held_out_psnr_db.push_back(static_cast<float>(step.evaluations[e].psnr_db));
+        t.held_out_at.push_back(step.evaluations[e].iteration);
+    }
     const IterationResult& r = step.result;
-    if (r.iteration == 0) return;
+    if (r.iteration == last) return;
+    last = r.iteration;
     const float share = t.loss.empty() ? 1 : kSmoothing;
     loss += share * (static_cast<float>(r.loss) - loss);
     psnr_db += share * (static_cast<float>(r.psnr_db) - psnr_db);
@@ -240,8 +274,21 @@ void LiveCurves::add(const LiveStep& step, TrainingCurves& t) {
         for (std::vector<float>* curve : {&t.loss, &t.psnr_db, &t.splats}) thin(*curve);
         stride *= 2;
     }
-    for (size_t e = t.held_out_psnr_db.size(); e < step.evaluations.size(); ++e)
-        t.held_out_psnr_db.push_back(static_cast<float>(step.evaluations[e].psnr_db));
+}
+
+RunSettings settings_of(const TrainOptions& o) {
+    return {o.iterations, o.max_splats.value_or(0), double(o.max_memory_bytes.value_or(0)) / kMiB};
+}
+
+RunChange change_of(const RunSettings& wanted, const RunSettings& now) {
+    RunChange change;
+    if (wanted.iterations > 0 && wanted.iterations != now.iterations)
+        change.iterations = wanted.iterations;
+    if (wanted.max_splats > 0 && wanted.max_splats != now.max_splats)
+        change.max_splats = wanted.max_splats;
+    if (wanted.max_memory_mib >= 0 && wanted.max_memory_mib != now.max_memory_mib)
+        change.max_memory_bytes = static_cast<std::uint64_t>(wanted.max_memory_mib * kMiB);
+    return change;
 }
 
 namespace {
@@ -307,9 +354,16 @@ void LiveView::State::follow_run(ViewerWindow& shown) {
         training.steps_to_go += std::exchange(seen.steps_to_go, 0);
         changed.notify_all();
     }
+    std::vector<RunWish>& asked = viewer.session().run_desk.wishes;
+    if (!asked.empty()) {
+        wishes.ask(std::exchange(asked, {}));
+        changed.notify_all();
+    }
     if (version != followed &&
         std::chrono::steady_clock::now() - redrawn >= std::chrono::duration<double>(kRedraw_s)) {
         const bool live = seen.live, was_finished = seen.finished;
+        for (std::size_t i = seen.said.size(); i < training.said.size(); ++i)
+            viewer.session().tell(training.said[i]);
         followed = version;
         seen = training;
         seen.live = live;
@@ -321,8 +375,10 @@ void LiveView::State::follow_run(ViewerWindow& shown) {
     if (!finished || ended) return;
     ended = true;
     const std::filesystem::path scene_file = model;
+    const std::string said = last_words;
     lock.unlock();
     viewer.end_live();
+    if (!said.empty()) viewer.session().tell(said);
     if (!scene_file.empty()) viewer.open(scene_file);
 }
 

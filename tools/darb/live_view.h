@@ -23,17 +23,23 @@ class LiveView {
     explicit LiveView(std::unique_ptr<State> state);
     ~LiveView();
 
-    /// Hands over what is new and draws a picture where one is due. It blocks while paused and
-    /// returns how long that was, in s. Once the window is closed it does nothing; where the window
-    /// fails, it is closed with a warning and the run goes on.
-    double show(const LiveStep& step);
-    /// The run is over: shows its scene until the window is closed.
-    void finish(const std::filesystem::path& model);
+    /// Hands over what is new and draws a picture where one is due. It blocks while paused, until
+    /// something is asked of the run, and returns how long that was with what was asked. Once the
+    /// window is closed it does nothing; where the window fails, it is closed with a warning and
+    /// the run goes on.
+    LiveAnswer show(const LiveStep& step);
+    /// Whether the user stopped the run and wants a web page of it.
+    bool publishes() const { return publishes_; }
+    /// The run is over: shows its scene until the window is closed, and says this first; empty:
+    /// nothing.
+    void finish(const std::filesystem::path& model, const std::string& said = {});
 
   private:
     double wait_while_paused(const LiveStep& step);
+    LiveAnswer take_wishes(double paused_s);
     void warn(const std::string& reason);
     std::unique_ptr<State> state_;
+    bool publishes_ = false;
 };
 
 /// Starts the window system, which must happen before the device is made; does nothing where `on`
@@ -61,7 +67,13 @@ struct LiveCurves {
 
     float loss = 0, psnr_db = 0;  // smoothed
     int stride = 1;               // iterations for each value of a curve
+    int last = 0;                 // the last iteration that was added
 };
+
+/// What a change that the window asks for means to the run. now: as the run has them.
+RunChange change_of(const RunSettings& wanted, const RunSettings& now);
+/// The settings that the window shows.
+RunSettings settings_of(const TrainOptions& options);
 
 /// The bounds of the sparse points that the cameras look at, or of the cameras where there are
 /// none.

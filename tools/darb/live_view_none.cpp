@@ -10,10 +10,10 @@ struct LiveSystem::System {};
 
 LiveView::LiveView(std::unique_ptr<State> state) : state_(std::move(state)) {}
 LiveView::~LiveView() = default;
-double LiveView::show(const LiveStep&) {
+LiveAnswer LiveView::show(const LiveStep&) {
     return 0;
 }
-void LiveView::finish(const std::filesystem::path&) {}
+void LiveView::finish(const std::filesystem::path&, const std::string&) {}
 
 LiveSystem::LiveSystem(bool on, const DeviceOptions&) {
     if (on)

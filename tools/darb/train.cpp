@@ -60,17 +60,21 @@ void take_tuning_of_first(Ranks& ranks, Device& device, bool keeps_own);
 namespace {
 
 // Writes the scene as a web page with the photos' cameras as bookmarks; also for a run that was
-// finished before, where there is no page yet.
-void leave_page(Device& device, const TrainJob& job, const TrainResult& result) {
+// finished before, where there is no page yet. publishes: the user stopped the run for it. Returns
+// whether it did.
+bool leave_page(Device& device, const TrainJob& job, const TrainResult& result, bool publishes) {
     const TrainRequest& request = job.request;
     const std::filesystem::path file = request.output / "scene.html";
     const bool trained = !result.model.empty();
-    if (!request.page || result.interrupted || (!trained && std::filesystem::exists(file))) return;
+    const bool due =
+        request.page && !result.interrupted && (trained || !std::filesystem::exists(file));
+    if (!due && !(publishes && trained)) return false;
     PageFlags page;
     if (request.train.white_background) page.background = "white";
     const SplatModel scene = load_scene(trained ? result.model : scene_of_run(request.output));
     write_or_let_go("page     " + write_page(device, scene, page, scene_name(request.output),
                                              job.dataset.views, file));
+    return true;
 }
 
 void refuse_stereo(const TrainJob& job, int ranks) {
@@ -167,8 +171,10 @@ int train(Ranks& ranks, TrainFlags flags, const std::vector<std::string>& typed)
     if (!write_or_let_go(summary_text(result, shown, request.output, sinks.ranks)))
         throw Error("standard output", std::string("cannot be written: ") + std::strerror(errno),
                     "The run is complete: its folder holds everything.");
-    leave_page(device, job, result);
-    if (view) view->finish(result.model);
+    const bool page = leave_page(device, job, result, view && view->publishes());
+    if (view)
+        view->finish(result.model,
+                     page ? "web page in " + (request.output / "scene.html").string() : "");
     return result.interrupted ? stop_exit_code() : 0;
 }
 

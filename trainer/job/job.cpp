@@ -217,6 +217,10 @@ TrainResult run(Device& device, TrainJob& job, const JobSinks& sinks) {
             start = {};  // it holds every photo
         };
     job.start.reset();
+    run.changed_request = [&job](const RunChange& change) {
+        apply_change(change, job.request.train);
+        return request_text(job.request);
+    };
     return run_training(device, job.dataset, job.options, run, sinks.stop, std::move(job.photos));
 }
 

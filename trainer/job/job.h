@@ -50,8 +50,8 @@ void find_start(Device& device, TrainJob& job, const std::function<void()>& begi
 struct JobSinks {
     bool quiet = false;                       // no progress on the terminal
     const std::atomic<bool>* stop = nullptr;  // set by others: the run saves itself and ends
-    std::function<double(const LiveStep&)> on_step = {};  // see RunOptions::on_step
-    RankGroup ranks = {};                                 // processes that train together
+    std::function<LiveAnswer(const LiveStep&)> on_step = {};  // see RunOptions::on_step
+    RankGroup ranks = {};                                     // processes that train together
 };
 
 /// Trains the job into its output folder; see run_training(). Lets go of the job's photos and

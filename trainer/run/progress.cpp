@@ -246,22 +246,28 @@ void Progress::update(const IterationResult& r, const Device& device) {
     loss_ = any_ ? loss_ + kSmoothing * (r.loss - loss_) : r.loss;
     psnr_db_ = any_ ? psnr_db_ + kSmoothing * (r.psnr_db - psnr_db_) : r.psnr_db;
     any_ = true;
-    if (quiet_) return;
     const auto now = Clock::now();
     if (left_)
         left_->add(r.iteration, std::chrono::duration<double>(now - begin_).count(), r.splats);
+    if (quiet_) return;
     const double since = std::chrono::duration<double>(now - last_print_).count();
     if (since < (terminal_ ? kTerminalSeconds : kPlainSeconds) && r.iteration < last_) return;
     last_print_ = now;
     say_text(fmt::format(fmt::runtime(terminal_ ? "\r{}\033[K" : "{}\n"), text(r, device)));
 }
 
+double Progress::seconds_left(int iteration) const {
+    const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+    const double rate = (iteration - first_ + 1) / std::max(seconds, 1e-6);
+    const double left = left_ ? left_->seconds() : 0;
+    return left > 0 ? left : std::max(0.0, (last_ - iteration) / std::max(rate, 1e-9));
+}
+
 std::string Progress::text(const IterationResult& r, const Device& device) const {
     const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
     const double done = r.iteration - first_ + 1;
     const double rate = done / std::max(seconds, 1e-6);
-    double left = left_ ? left_->seconds() : 0;
-    if (left <= 0) left = (last_ - r.iteration) / std::max(rate, 1e-9);
+    const double left = seconds_left(r.iteration);
     std::string bar;
     if (terminal_) {
         const int filled = static_cast<int>(20.0 * r.iteration / std::max(last_, 1));

@@ -71,6 +71,10 @@ class Progress {
   public:
     Progress(int first_iteration, int last_iteration, bool quiet);
 
+    /// The run ends with another iteration.
+    void set_last(int iteration) { last_ = iteration; }
+    /// Seconds that are left after this iteration; 0: nothing is known yet.
+    double seconds_left(int iteration) const;
     /// How the pace will change; without, what is left is told by the pace so far.
     void expect(const Schedule& schedule, const PaceForecast& pace);
     /// After every finished iteration; decides itself when to print.

@@ -110,6 +110,10 @@ class Run {
     void write_cameras();
     void write_kernel();
     void show_step();
+    void change(const RunChange& change);
+    void measure_now();
+    void save_now();
+    void tell(const std::string& what);
     void save_checkpoint(const std::filesystem::path& path);
     void begin();
     void train(const std::atomic<bool>* stop);
@@ -138,7 +142,7 @@ class Run {
 
     Device& device_;
     const Dataset& dataset_;
-    const Schedule& schedule_;
+    Schedule schedule_;
     const RunOptions& run_;
     std::vector<ImageU8> photos_;  // [view]; while it trains of held-out views alone
     const std::string fingerprint_;
@@ -150,6 +154,9 @@ class Run {
     RunLog log_;
     Progress progress_;
     TrainResult summary_;
+    std::optional<PaceForecast> pace_;
+    std::vector<std::string> said_;  // to a live view
+    bool stops_ = false;             // a live view asked for it
     IterationResult latest_;
     size_t told_probes_ = 0;
     std::uint32_t told_by_memory_ = 0,
@@ -335,11 +342,68 @@ void Run::save_checkpoint(const std::filesystem::path& path) {
 
 // The stopwatch counts what the view draws, which shares the device, and no pause.
 void Run::show_step() {
-    const double paused_s =
-        run_.on_step({trainer_.splats(), trainer_.iteration(), schedule_.options.iterations,
-                      latest_, summary_.evaluations});
-    seconds_ -= paused_s;
-    progress_.leave_out(paused_s);
+    for (bool again = true; again && !stops_;) {
+        const LiveAnswer answer = run_.on_step(
+            {trainer_.splats(), trainer_.iteration(), schedule_.options.iterations, latest_,
+             summary_.evaluations, schedule_.options, progress_.seconds_left(trainer_.iteration()),
+             device_.allocated_bytes(), said_});
+        seconds_ -= answer.paused_s;
+        progress_.leave_out(answer.paused_s);
+        for (const RunChange& wanted : answer.changes) change(wanted);
+        if (trainer_.iteration() < trainer_.last_iteration()) {  // else both follow anyway
+            if (answer.measures) measure_now();
+            if (answer.saves) save_now();
+        }
+        stops_ = answer.stops;
+        again = answer.again;
+    }
+}
+
+void Run::measure_now() {
+    const bool known = !summary_.evaluations.empty() &&
+                       summary_.evaluations.back().iteration == trainer_.iteration();
+    if (!known) evaluate(trainer_.iteration());
+}
+
+void Run::tell(const std::string& what) {
+    progress_.note(what);
+    said_.push_back(what);
+}
+
+// Checkpoint and request change together, so that a run that is resumed knows the settings.
+void Run::change(const RunChange& wanted) {
+    const TrainOptions before = schedule_.options;
+    std::string refusal =
+        change_refusal(wanted, before,
+                       {trainer_.iteration(), trainer_.averages_now(),
+                        !summary_.ended_early.empty(), run_.ranks.several(), device_.peak_bytes()});
+    TrainOptions options = before;
+    apply_change(wanted, options);
+    const std::string text = change_text(before, options);
+    if (refusal.empty() && text.empty()) refusal = "Nothing of it is other than it was.";
+    std::optional<Schedule> next;
+    if (refusal.empty()) try {
+            next.emplace(options);
+        } catch (const Error& e) {
+            refusal = e.what();
+        }
+    if (!next) return tell("not changed: " + refusal);
+    trainer_.reschedule(*next);
+    schedule_ = *next;
+    save_checkpoint(run_.output / "checkpoint.darb");
+    if (run_.changed_request)
+        write_file_atomic(run_.output / "request.json", run_.changed_request(wanted));
+    log_.changed(trainer_.iteration(), text, schedule_);
+    progress_.set_last(schedule_.options.iterations);
+    if (pace_) progress_.expect(schedule_, *pace_);
+    tell(fmt::format("after iteration {}: {}", trainer_.iteration(), text));
+}
+
+void Run::save_now() {
+    save_checkpoint(run_.output / "checkpoint.darb");
+    save_model(trainer_.iteration());
+    tell(fmt::format("iteration {}: saved the checkpoint and {}", trainer_.iteration(),
+                     summary_.model.string()));
 }
 
 // Whether metrics.json is that of a whole run, which nothing is to be added to.
@@ -389,10 +453,10 @@ TrainResult Run::execute(const std::atomic<bool>* stop) {
     // until it ends.
     std::error_code none;
     std::filesystem::remove(run_.output / "metrics.json", none);
-    const std::optional<PaceForecast> pace = run_.pace ? run_.pace : log_.pace();
-    if (pace) progress_.expect(schedule_, *pace);
+    pace_ = run_.pace ? run_.pace : log_.pace();
+    if (pace_) progress_.expect(schedule_, *pace_);
     log_.start(device_, rates_, dataset_, schedule_, trainer_.splat_count(), run_.effects_json,
-               pace);
+               pace_);
     try {
         train(stop);
     } catch (const std::exception& e) {
@@ -461,7 +525,7 @@ void Run::train(const std::atomic<bool>* stop) {
     const auto is_over = [&] {
         if (trainer_.iteration() >= trainer_.last_iteration()) return true;
         whole_ = false;  // a rank that differs: whose splats are right, nobody knows
-        const bool stops = is_to_stop(trainer_, run_.ranks, stop && stop->load());
+        const bool stops = is_to_stop(trainer_, run_.ranks, stops_ || (stop && stop->load()));
         whole_ = true;
         return stops;
     };

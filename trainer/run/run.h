@@ -20,6 +20,7 @@
 #include "engine/render/cleaning.h"
 #include "trainer/options/schedule.h"
 #include "trainer/run/progress.h"
+#include "trainer/run/run_change.h"
 #include "trainer/run/run_report.h"
 #include "trainer/step/checkpoint.h"
 #include "trainer/step/rank_group.h"
@@ -33,6 +34,10 @@ struct LiveStep {
     int iteration = 0, last_iteration = 0;
     const IterationResult& result;  // the latest iteration whose result is known
     const std::vector<Evaluation>& evaluations;
+    const TrainOptions& options;           // as they are now
+    double seconds_left = 0;               // 0: not known yet
+    std::uint64_t memory_bytes = 0;        // of the device, in use
+    const std::vector<std::string>& said;  // what became of answers, latest last
 };
 
 struct RunOptions {
@@ -46,9 +51,10 @@ struct RunOptions {
     /// where no run has done so: look_again(). What it finds is for later runs, so that the bits of
     /// this one do not depend on it.
     bool look_again = false;
-    /// May be empty. Returns the seconds that it held the run up on purpose (a pause), which are
-    /// no training time.
-    std::function<double(const LiveStep&)> on_step;
+    /// May be empty. What it held the run up on purpose (a pause) is no training time.
+    std::function<LiveAnswer(const LiveStep&)> on_step;
+    /// The content of request.json after a change; empty: it stays.
+    std::function<std::string(const RunChange&)> changed_request;
     std::optional<PaceForecast> pace;  // for the time that is left, and for the log
     std::string request;               // content of request.json, for --resume; may be empty
     std::string effects;               // the plan in a line, for the log

@@ -220,6 +220,13 @@ void RunLog::cleaned(int iteration, const Clutter& clutter, double psnr_before, 
            {"psnr_after", psnr_after}});
 }
 
+void RunLog::changed(int iteration, const std::string& what, const Schedule& now) {
+    write({{"event", "changed"},
+           {"iteration", iteration},
+           {"what", what},
+           {"settings", Json::parse(settings_text(now))}});
+}
+
 void RunLog::failure(int iteration, const std::string& what) {
     try {
         write({{"event", "failure"}, {"iteration", iteration}, {"what", shared_text(what)}});
@@ -286,6 +293,9 @@ void add_events(const std::vector<Json>& events, ReportData& data) {
         if (const Json arc = e.value("arc", Json::object()); kind == "evaluation" && !arc.empty())
             data.arcs.push_back({e.value("iteration", 0), number(arc, "psnr_db"),
                                  number(arc, "ssim"), arc.value("views", 0u)});
+        if (kind == "changed")
+            data.notes.push_back(fmt::format("After iteration {} settings were changed: {}.",
+                                             e.value("iteration", 0), e.value("what", "")));
         if (kind == "ends_early")
             data.notes.push_back(fmt::format("The run ended itself at iteration {}: {}.",
                                              e.value("end", 0), e.value("reason", "")));
@@ -314,7 +324,9 @@ ReportData RunLog::report_data(const TrainResult& summary) const {
             1e-9 * rates_.bytes_per_s, 1e-9 * rates_.fma_per_s));
     data.settings.emplace_back("strategy",
                                start_.value("strategy", std::string(strategy_name(Strategy{}))));
-    const Json settings = start_.value("settings", Json::object());
+    Json settings = start_.value("settings", Json::object());
+    for (const Json& e : events_)
+        if (e.value("event", "") == "changed") settings = e.value("settings", settings);
     for (const auto& [name, value] : settings.items())
         if (name != "effects" && name != "strategy")
             data.settings.emplace_back(name, setting_text(value));
@@ -355,6 +367,13 @@ Json probes_of(const std::vector<Json>& events) {
                               {"gain_db", number(e, "gain_db")},
                               {"admitted", e.value("admitted", false)}});
     return probes;
+}
+
+Json changes_of(const std::vector<Json>& events) {
+    Json changes = Json::array();
+    for (const Json& e : events)
+        if (e.value("event", "") == "changed") changes.push_back(e);
+    return changes;
 }
 
 /// The splats at which a limit stopped the growth last; 0: it did not.
@@ -411,6 +430,7 @@ std::filesystem::path RunLog::finish(const TrainResult& summary, const Trainer& 
     if (trainer.schedule().options.learn_kernel > 0)
         if (const KernelDefinition* own = kernel_definition(trainer.kernel()))
             metrics["kernel_definition"] = definition_json(*own);
+    if (const Json changes = changes_of(events_); !changes.empty()) metrics["changes"] = changes;
     if (!summary.ended_early.empty()) metrics["ended_early"] = summary.ended_early;
     if (const std::optional<CameraMoves> m = trainer.camera_moves()) {
         metrics["cameras"] = {{"refined", m->cameras},

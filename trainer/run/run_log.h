@@ -62,6 +62,8 @@ class RunLog {
     /// photos; NaN where none is held out.
     void cleaned(int iteration, const Clutter& clutter, double psnr_before, double psnr_after);
     /// What ended the run before its time; nothing where the log cannot be written.
+    /// Settings were changed after this iteration; what: change_text().
+    void changed(int iteration, const std::string& what, const Schedule& now);
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);
     /// The passes of the run so far, in their order.

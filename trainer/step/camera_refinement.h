@@ -44,6 +44,8 @@ class CameraRefinement {
   public:
     /// Throws Error where fewer than three photos are trained on.
     CameraRefinement(const Dataset& dataset, const TrainOptions& options);
+    /// Another length of the same run from now on.
+    void set_iterations(int iterations) { iterations_ = iterations; }
 
     /// The refined camera of a view at its whole size; of a held-out one only the intrinsics are
     /// refined.

@@ -102,6 +102,8 @@ class DegreeProbe {
     void run(TrainerState& state, const std::vector<int>& views, bool has_room,
              const ProbeFork& fork);
 
+    /// Another schedule of the same run from now on; next() stays.
+    void set_schedule(const Schedule& schedule) { schedule_ = schedule; }
     const std::vector<ProbeResult>& results() const { return results_; }
     int next() const { return next_; }
     /// 0 leaves it as it is.

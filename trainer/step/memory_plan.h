@@ -119,6 +119,9 @@ class MemoryBudget {
     MemoryBudget(Device& device, const Dataset& dataset, const Schedule& schedule,
                  std::uint32_t start_splats);
 
+    /// Other limits from now on.
+    void set_schedule(const Schedule& schedule) { schedule_ = schedule; }
+
     /// Whether photos are to wait on the host: photos_stream().
     bool streams_photos() const { return photos_.streams; }
 

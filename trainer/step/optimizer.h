@@ -28,6 +28,9 @@ class Optimizer {
     /// take a step in each.
     AdamStep trial_step(int iteration, float share) const;
 
+    /// The rates of another schedule of the same run from now on.
+    void set_schedule(const Schedule& schedule) { schedule_ = schedule; }
+
     /// Factor for lengths that options give for a Gaussian as shares of the scene extent.
     double length() const { return schedule_.length_scale * extent_; }
 

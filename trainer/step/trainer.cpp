@@ -104,6 +104,18 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
     step_.reserve(photos_.largest_width(), photos_.largest_height());
 }
 
+void Trainer::reschedule(const Schedule& next) {
+    drain();
+    schedule_ = next;
+    optimizer_.set_schedule(next);
+    memory_.set_schedule(next);
+    probe_.set_schedule(next);
+    if (cameras_) cameras_->set_iterations(next.options.iterations);
+    strategy_ = strategy_row(next.options.strategy).make({*device_, schedule_, extent_});
+    strategy_->set_kernel(splats_.kernel());
+    device_->set_memory_budget(next.options.max_memory_bytes.value_or(0));
+}
+
 int Trainer::degree_at(int iteration) const {
     return schedule_.options.probe_sh ? splats_.sh_degree() : schedule_.sh_degree(iteration);
 }

@@ -118,6 +118,9 @@ class Trainer {
     /// The run is to end sooner, as Schedule::end_early() has it. Not part of state(): after
     /// restore(), call it again with the same iteration.
     void end_early(int iteration) { schedule_.end_early(iteration); }
+    /// Other iterations and limits for the run from now on, as if it had been restored from a
+    /// checkpoint under them: what buffers and passes are made for must be the same. Drains.
+    void reschedule(const Schedule& next);
     int views_a_step() const { return schedule_.options.batch; }
     std::uint32_t splat_count() const { return splats_.count(); }
     /// On the device, for work on the same queue between steps; the object stays, its buffers are
@@ -131,6 +134,8 @@ class Trainer {
     }
     /// KERNEL_* of the splats now, which changes where its profile is learned.
     int kernel() const { return splats_.kernel(); }
+    /// Whether the mean that the run is to end with has begun.
+    bool averages_now() const { return average_.count() > 0 || mean_left_out_; }
     /// What the sides of the photos are divided by now: 1 without a resolution ramp.
     int resolution_divisor() const { return photos_.divisor(); }
     /// Whether the device had no room for the mean that the run was to end with.

@@ -10,7 +10,10 @@
 
 #include "engine/scene/clutter.h"
 #include "engine/scene/splat_file.h"
+#include "viewer/commands.h"
+#include "viewer/guides.h"
 #include "viewer/panels/panels.h"
+#include "viewer/view_camera.h"
 
 namespace darb {
 
@@ -25,21 +28,13 @@ bool edit_vector(const char* label, glm::dvec3& v, float speed, int components) 
                               nullptr, "%.3f");
 }
 
-// Draws the part of the line that is in front of the camera.
 void line(const Camera& camera, const glm::dvec3& a, const glm::dvec3& b) {
-    glm::dvec3 p = camera.rotation * a + camera.translation;
-    glm::dvec3 q = camera.rotation * b + camera.translation;
-    constexpr double kNear = 1e-3;
-    if (p.z < kNear && q.z < kNear) return;
-    glm::dvec3& behind = p.z < q.z ? p : q;
-    const glm::dvec3& ahead = p.z < q.z ? q : p;
-    if (behind.z < kNear)
-        behind = glm::mix(ahead, behind, (ahead.z - kNear) / (ahead.z - behind.z));
-    const auto at = [&](const glm::dvec3& v) {
-        return ImVec2(static_cast<float>(camera.fx * v.x / v.z + camera.cx),
-                      static_cast<float>(camera.fy * v.y / v.z + camera.cy));
+    const auto px = pixels_of(camera, {a, b});
+    if (!px) return;
+    const auto at = [](const glm::dvec2& p) {
+        return ImVec2(static_cast<float>(p.x), static_cast<float>(p.y));
     };
-    ImGui::GetBackgroundDrawList()->AddLine(at(p), at(q), kOutline, 1.5f);
+    ImGui::GetBackgroundDrawList()->AddLine(at((*px)[0]), at((*px)[1]), kOutline, 1.5f);
 }
 
 void draw_box(const Camera& camera, const Region& r) {
@@ -69,26 +64,10 @@ void draw_sphere(const Camera& camera, const Region& r) {
         }
 }
 
-void tool_choice(Session& s) {
-    constexpr const char* kNames[kToolCount] = {"orbit", "rectangle", "lasso", "brush",  "sphere",
-                                                "move",  "turn",      "scale", "measure"};
-    constexpr float kColumns[] = {0, 88, 186, 262};  // px at scale 1
-    constexpr const char* kTips[kToolCount] = {
-        "Drag with the left button to orbit (1)",
-        "Select in a rectangle, hidden splats behind others too; Shift adds, Ctrl takes away (2)",
-        "Select inside an outline; Shift adds, Ctrl takes away (3)",
-        "Select by painting; Shift adds, Ctrl takes away (4)",
-        "Select around the splat where the drag begins; Shift adds, Ctrl takes away (5)",
-        "Drag an arrow to move the selection, or everything if nothing is selected (6)",
-        "Drag a ring to turn the selection, together with its harmonics (7)",
-        "Drag the ring to scale the selection (8)",
-        "Click points of the surface to measure between them; see the section Measure (9)"};
-    for (int i = 0; i < kToolCount; ++i) {
-        if (i % 4 != 0) ImGui::SameLine(kColumns[i % 4] * s.gui_scale);
-        if (ImGui::RadioButton(kNames[i], static_cast<int>(s.tools.tool) == i))
-            choose_tool(static_cast<Tool>(i), s);
-        tip(kTips[i]);
-    }
+void tool_settings(Session& s) {
+    const Command& c = command(
+        static_cast<Key>(static_cast<int>(Key::tool_navigate) + static_cast<int>(s.tools.tool)));
+    ImGui::TextWrapped("%s: %s", c.name, c.tip);
     if (s.tools.tool != Tool::brush) return;
     ImGui::SliderFloat("brush", &s.tools.brush_px, 4, 300, "%.0f px", kLogarithmic);
     tip("Radius of the brush on the screen");
@@ -102,48 +81,36 @@ void select(const SplatSet& mask, Session& s) {
               s);
 }
 
-void selection_buttons(Session& s) {
-    const SplatModel& model = s.scene->model;
-    ImGui::Text("%zu selected, %zu hidden, %zu deleted", s.edit.selected_count(),
-                s.edit.hidden_count(), s.edit.removed_count());
-    if (ImGui::Button("All")) select(SplatSet(model.size(), 1), s);
-    tip("Ctrl+A");
-    ImGui::SameLine();
-    if (ImGui::Button("None")) select(SplatSet(model.size(), 0), s);
-    tip("Ctrl+D");
-    ImGui::SameLine();
-    if (ImGui::Button("Invert")) show_edit(s.edit.invert_selection(), s);
-    tip("Ctrl+I");
-    ImGui::SameLine();
+void grow_button(Session& s) {
     if (ImGui::Button("Grow"))
-        show_edit(
-            s.edit.select(grown(model, s.edit.selected(), double{s.tools.grow}), Combine::add), s);
+        show_edit(s.edit.select(grown(s.scene->model, s.edit.selected(), double{s.tools.grow}),
+                                Combine::add),
+                  s);
     tip("Add all splats that are nearer to a selected one than the distance on the right");
     ImGui::SameLine();
-    ImGui::SetNextItemWidth(70 * s.gui_scale);
-    ImGui::DragFloat("##grow", &s.tools.grow, s.tools.grow / 100, 1e-6f, 1e6f, "%.3g units",
+    ImGui::SetNextItemWidth(110 * s.gui_scale);
+    ImGui::DragFloat("##grow", &s.tools.grow, s.tools.grow / 100, 1e-6f, 1e6f, "by %.3g units",
                      kClamped);
     tip("In units of the scene; drag, or Ctrl+click to type");
-    if (ImGui::Button("Hide")) show_edit(s.edit.hide_selected(), s);
-    tip("Hide the selection (Ctrl+H); hidden splats are still saved");
-    ImGui::SameLine();
-    if (ImGui::Button("Show")) show_edit(s.edit.show_hidden(), s);
-    tip("Show everything that is hidden (Ctrl+U)");
-    ImGui::SameLine();
-    if (ImGui::Button("Delete")) show_edit(s.edit.remove_selected(), s);
-    tip("Delete the selection (Delete)");
 }
 
-void undo_buttons(Session& s) {
-    ImGui::BeginDisabled(!s.edit.can_undo());
-    if (ImGui::Button("Undo")) undo_edit(s);
-    ImGui::EndDisabled();
-    tip("Ctrl+Z");
+void selection_buttons(Session& s) {
+    ImGui::Text("%zu selected, %zu hidden, %zu deleted", s.edit.selected_count(),
+                s.edit.hidden_count(), s.edit.removed_count());
+    for (const Key id : {Key::select_all, Key::select_none, Key::select_others}) {
+        command_button(id, s);
+        ImGui::SameLine();
+    }
+    ImGui::NewLine();
+    grow_button(s);
+    command_button(Key::hide, s);
     ImGui::SameLine();
-    ImGui::BeginDisabled(!s.edit.can_redo());
-    if (ImGui::Button("Redo")) redo_edit(s);
-    ImGui::EndDisabled();
-    tip("Ctrl+Y");
+    command_button(Key::show_hidden, s);
+    for (const Key id : {Key::remove, Key::undo, Key::redo}) {
+        command_button(id, s);
+        ImGui::SameLine();
+    }
+    ImGui::NewLine();
 }
 
 void count_values(const SplatModel& model, int version, ValueHistograms& h) {
@@ -323,27 +290,26 @@ void draw_region(const Session& s, int width, int height) {
 }
 
 void edit_panel(Session& s) {
-    if (!s.scene || !ImGui::CollapsingHeader("Edit")) return;
-    ImGui::PushID("edit");
-    tool_choice(s);
+    tool_settings(s);
     selection_buttons(s);
-    undo_buttons(s);
     clean_up(s);
     select_by_value(s);
     select_by_region(s);
-    if (ImGui::Button("Merge a scene ...")) s.ask(request::ShowOpen{true});
-    tip("Add the splats of another file to this scene, at the positions that they have there");
-    path_field("file", s.save_file);
+}
+
+void save_panel(Session& s) {
+    ImGui::TextDisabled("Save as");
+    ImGui::SetNextItemWidth(-FLT_MIN);
+    path_field("##save", s.save_file);
     tip("The ending of the name decides the format");
+    command_button(Key::save, s);
     ImGui::SameLine();
-    if (ImGui::Button("Save")) s.ask(request::Save{});
-    tip("Save the edited scene (Ctrl+S)");
+    ImGui::SetNextItemWidth(130 * s.gui_scale);
     format_choice(s);
-    if (ImGui::Button("Save as web page")) s.ask(request::SavePage{});
-    tip("Write an .html file for any browser beside the file");
     ImGui::Checkbox("save upright", &s.save_upright);
     tip("Turn the saved scene so that up is -y, as most programs expect");
-    ImGui::PopID();
+    command_button(Key::save_page, s);
+    command_button(Key::merge, s);
 }
 
 }  // namespace darb

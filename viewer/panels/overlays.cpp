@@ -79,12 +79,18 @@ void draw_line(const Session& s, float share, const ImVec2& size) {
 void draw_label(const Session& s, const std::string& text, float left, float right,
                 std::vector<float>& ends) {
     const float gap = kLabelGap * s.gui_scale, window = ImGui::GetIO().DisplaySize.x;
+    const float size_y = ImGui::GetIO().DisplaySize.y;
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
-    const float begin = std::max(left, panel_width(s));
-    if (begin + gap > right) return;
-    const float x = std::min(begin, window - size.x - 2 * gap) + gap;
-    const auto free = std::find_if(ends.begin(), ends.end(), [&](float end) { return end <= x; });
-    const float y = gap + float(free - ends.begin()) * (size.y + 2 * gap);
+    const WindowArea area = free_area(s, static_cast<int>(window), static_cast<int>(size_y));
+    const float begin = std::max(left, static_cast<float>(area.left));
+    const float end = std::min(right, window - static_cast<float>(area.right));
+    if (begin + gap > end) return;
+    const float x =
+        std::min(begin, window - static_cast<float>(area.right) - size.x - 2 * gap) + gap;
+    const auto free =
+        std::find_if(ends.begin(), ends.end(), [&](float row_end) { return row_end <= x; });
+    const float y =
+        static_cast<float>(area.top) + gap + float(free - ends.begin()) * (size.y + 2 * gap);
     if (free == ends.end())
         ends.push_back(x + size.x + gap);
     else
@@ -155,8 +161,6 @@ void panes_panel(Session& s) {
 namespace {
 
 constexpr ImU32 kStroke = IM_COL32(255, 200, 60, 255), kStrokeFill = IM_COL32(255, 200, 60, 40);
-constexpr ImU32 kAxisColours[3] = {IM_COL32(255, 90, 90, 255), IM_COL32(110, 220, 90, 255),
-                                   IM_COL32(90, 150, 255, 255)};
 constexpr ImU32 kHeldColour = IM_COL32(255, 225, 80, 255);
 constexpr int kToastsShown = 4;
 constexpr float kToastGap = 8;  // px at scale 1
@@ -193,6 +197,16 @@ void draw_stroke(const Session& s, const Camera& camera) {
     }
 }
 
+// The head of an arrow; a disc where it points at the eye.
+void draw_head(ImDrawList& list, const ImVec2& from, const ImVec2& to, ImU32 colour, float scale) {
+    const float dx = to.x - from.x, dy = to.y - from.y, length = std::hypot(dx, dy);
+    if (length < 20 * scale) return list.AddCircleFilled(to, 7 * scale, colour);
+    const float ux = dx / length * scale, uy = dy / length * scale;
+    list.AddTriangleFilled(ImVec2(to.x + 8 * ux, to.y + 8 * uy),
+                           ImVec2(to.x - 8 * ux - 7 * uy, to.y - 8 * uy + 7 * ux),
+                           ImVec2(to.x - 8 * ux + 7 * uy, to.y - 8 * uy - 7 * ux), colour);
+}
+
 void draw_gizmo(const Session& s, const Camera& camera) {
     const std::optional<Gizmo> gizmo = gizmo_of(s);
     if (!gizmo) return;
@@ -209,12 +223,12 @@ void draw_gizmo(const Session& s, const Camera& camera) {
             line.push_back(point(*at));
         }
         if (line.size() < 2) continue;
-        const ImU32 colour = held == axis ? kHeldColour : kAxisColours[axis];
+        const ImU32 colour = held == axis ? kHeldColour : axis_colour(axis);
         list.AddPolyline(line.data(), static_cast<int>(line.size()), IM_COL32(0, 0, 0, 150), 0,
                          6 * s.gui_scale);
-        list.AddPolyline(line.data(), static_cast<int>(line.size()), colour, 0, 3 * s.gui_scale);
-        if (gizmo->mode == GizmoMode::move)
-            list.AddCircleFilled(line.back(), 7 * s.gui_scale, colour);
+        list.AddPolyline(line.data(), static_cast<int>(line.size()), colour, 0,
+                         (held == axis ? 5.0f : 3.0f) * s.gui_scale);
+        if (gizmo->mode == GizmoMode::move) draw_head(list, line[0], line[1], colour, s.gui_scale);
     }
 }
 
@@ -230,8 +244,10 @@ void draw_tools(const Session& s, int width, int height) {
 // The latest message is the lowest, in the middle of the free area.
 void draw_toasts(const Session& s) {
     const ImVec2 size = ImGui::GetIO().DisplaySize;
-    const float gap = kToastGap * s.gui_scale, left = panel_width(s);
-    const float wrap = std::max(200.0f, std::min(size.x - left - 4 * gap, 620 * s.gui_scale));
+    const WindowArea area = free_area(s, static_cast<int>(size.x), static_cast<int>(size.y));
+    const float gap = kToastGap * s.gui_scale, left = static_cast<float>(area.left);
+    const float free = static_cast<float>(area.free_width());
+    const float wrap = std::max(200.0f, std::min(free - 4 * gap, 620 * s.gui_scale));
     float bottom =
         size.y - 4 * gap -
         (std::max({s.progress.load, s.progress.exporting, s.progress.mesh}) >= 0 ? 60 * s.gui_scale
@@ -242,7 +258,7 @@ void draw_toasts(const Session& s) {
          ++toast, ++shown) {
         const char* text = toast->text.c_str();
         const ImVec2 box = ImGui::CalcTextSize(text, nullptr, false, wrap);
-        const float x = std::round(left + (size.x - left - box.x) / 2);
+        const float x = std::round(left + (free - box.x) / 2);
         const float y = std::round(bottom - box.y - 2 * gap);
         list.AddRectFilled(ImVec2(x - 1.5f * gap, y - gap),
                            ImVec2(x + box.x + 1.5f * gap, y + box.y + gap),

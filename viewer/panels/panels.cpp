@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The side panel as a whole, and what is drawn over the picture: progress, errors, help.
+// The panels as a whole: where menus, toolbar, outliner and properties are docked, and what is
+// drawn over the picture: progress, errors, questions.
 #include "viewer/panels/panels.h"
 
 #include <imgui.h>
@@ -15,10 +16,18 @@ namespace darb {
 
 namespace {
 
-constexpr float kWidth = 340;  // px at scale 1
-constexpr float kMargin = 8;   // px
-// share of the width: the room beside the panel is used alone only if it has this much
+// px at scale 1
+constexpr float kMenu = 23, kToolbar = 44, kSide = 350, kProgress = 340;
+constexpr float kOutlinerShare = 0.22f;  // of the height of the side
+constexpr float kLeastOutliner = 92, kMostOutliner = 220;
+// share of the width: panels leave that much to the picture, or else cover it
 constexpr double kLeastFree = 0.4;
+constexpr float kMostSide = 0.6f;  // share of the width
+constexpr float kLeastHeight = 4;  // menus that are high
+
+constexpr ImGuiWindowFlags kDocked =
+    ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
+    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoSavedSettings;
 
 void progress_window(Session& s, float width, float height) {
     const WorkProgress& p = s.progress;
@@ -34,7 +43,7 @@ void progress_window(Session& s, float width, float height) {
         : p.searching >= 0 ? std::pair("looking for splats in free space", p.searching)
                            : std::pair(p.mesh_stage.c_str(), p.mesh);
     ImGui::TextUnformatted(text);
-    ImGui::ProgressBar(static_cast<float>(share), ImVec2(kWidth * s.gui_scale, 0));
+    ImGui::ProgressBar(static_cast<float>(share), ImVec2(kProgress * s.gui_scale, 0));
     ImGui::SameLine();
     if (ImGui::Button("Cancel"))
         s.ask(loads ? Request(request::CancelLoad{}) : Request(request::CancelWork{}));
@@ -88,39 +97,114 @@ void leaving_window(Session& s, float width, float height) {
     ImGui::End();
 }
 
-void empty_hint(const Session& s, float width, float height) {
-    if (s.scene || s.training.live || s.progress.load >= 0) return;
-    const char* text = "Drop a splat file here, or press Ctrl+O";
-    const ImVec2 size = ImGui::CalcTextSize(text);
-    ImGui::GetBackgroundDrawList()->AddText(ImVec2((width - size.x) / 2, (height - size.y) / 2),
-                                            IM_COL32(220, 222, 226, 255), text);
-}
+struct TabRow {
+    Tab tab;
+    const char* name;
+    void (*draw)(Session&);
+    bool (*there)(const Session&);
+};
 
-void side_panel(Session& s, float height) {
-    ImGui::SetNextWindowPos(ImVec2(kMargin, kMargin), ImGuiCond_FirstUseEver);
-    ImGui::SetNextWindowSizeConstraints(ImVec2(kWidth * s.gui_scale, 0),
-                                        ImVec2(kWidth * s.gui_scale, height - 2 * kMargin));
-    ImGui::Begin("darb", nullptr, ImGuiWindowFlags_AlwaysAutoResize);
-    ImGui::PushItemWidth(150 * s.gui_scale);
-    scene_panel(s);
-    training_panel(s);
+constexpr auto kAlways = [](const Session&) { return true; };
+constexpr auto kWithScene = [](const Session& s) { return s.scene != nullptr; };
+
+void view_tab(Session& s) {
     display_panel(s);
-    camera_panel(s);
-    performance_panel(s);
+    ImGui::Spacing();
+    ImGui::TextDisabled("For experts");
+    kernel_panel(s);
     accuracy_panel(s);
     effects_panel(s);
-    mesh_panel(s);
-    measure_panel(s);
-    edit_panel(s);
-    path_panel(s);
-    if (ImGui::Button("Keys and mouse (?)")) s.help = !s.help;
-    tip("all keys, key ?");
-    if (!s.note.empty()) {
-        ImGui::Separator();
-        ImGui::TextWrapped("%s", s.note.c_str());
+    performance_panel(s);
+}
+
+constexpr TabRow kTabs[] = {
+    {Tab::training, "Training", training_panel, [](const Session& s) { return s.training.live; }},
+    {Tab::scene, "Scene", scene_panel,
+     [](const Session& s) { return !s.training.live || s.scene; }},
+    {Tab::view, "View", view_tab, kAlways},
+    {Tab::camera, "Camera", camera_panel, kAlways},
+    {Tab::splats, "Splats", edit_panel, kWithScene},
+    {Tab::mesh, "Mesh", mesh_panel, kWithScene},
+    {Tab::measure, "Measure", measure_panel, kWithScene},
+    {Tab::film, "Film", path_panel, kAlways},
+};
+
+const TabRow& shown_tab(const Session& s) {
+    const TabRow* first = nullptr;
+    for (const TabRow& row : kTabs) {
+        if (!row.there(s)) continue;
+        if (row.tab == s.tab) return row;
+        if (first == nullptr) first = &row;
     }
+    return *first;
+}
+
+// Two rows of buttons of one width, so that every name is readable at every scale.
+void tab_buttons(Session& s, const TabRow& shown) {
+    constexpr int kColumns = 4;
+    const float gap = 4 * s.gui_scale;
+    const float width =
+        std::floor((ImGui::GetContentRegionAvail().x - (kColumns - 1) * gap) / kColumns);
+    int column = 0;
+    for (const TabRow& row : kTabs) {
+        if (!row.there(s)) continue;
+        if (column++ % kColumns != 0) ImGui::SameLine(0, gap);
+        const bool on = &row == &shown;
+        if (on)
+            ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
+        if (ImGui::Button(row.name, ImVec2(width, 0))) s.tab = row.tab;
+        if (on) ImGui::PopStyleColor();
+    }
+    ImGui::Separator();
+}
+
+void properties(Session& s) {
+    const TabRow& shown = shown_tab(s);
+    tab_buttons(s, shown);
+    const float status = s.note.empty() ? 0 : 3.4f * ImGui::GetTextLineHeight();
+    ImGui::BeginChild("tab", ImVec2(0, -status - (status > 0 ? 8 * s.gui_scale : 0)));
+    ImGui::PushItemWidth(150 * s.gui_scale);
+    ImGui::PushID(static_cast<int>(shown.tab));
+    shown.draw(s);
+    ImGui::PopID();
     ImGui::PopItemWidth();
+    ImGui::EndChild();
+    if (status == 0) return;
+    ImGui::Separator();
+    ImGui::BeginChild("note");
+    ImGui::TextWrapped("%s", s.note.c_str());
+    ImGui::EndChild();
+}
+
+float side_width(const Session& s, float width) {
+    return std::min(kSide * s.gui_scale, kMostSide * width);
+}
+
+void side_panels(Session& s, float width, float height) {
+    const float top = std::round(kMenu * s.gui_scale), side = std::round(side_width(s, width));
+    const float outliner =
+        std::round(std::clamp(kOutlinerShare * (height - top), kLeastOutliner * s.gui_scale,
+                              kMostOutliner * s.gui_scale));
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
+    ImGui::SetNextWindowPos(ImVec2(width - side, top));
+    ImGui::SetNextWindowSize(ImVec2(side, outliner));
+    ImGui::Begin("Outliner", nullptr, kDocked);
+    draw_outliner(s);
     ImGui::End();
+    ImGui::SetNextWindowPos(ImVec2(width - side, top + outliner));
+    ImGui::SetNextWindowSize(ImVec2(side, std::max(height - top - outliner, 1.0f)));
+    ImGui::Begin("Properties", nullptr, kDocked);
+    properties(s);
+    ImGui::End();
+    ImGui::PopStyleVar();
+}
+
+void follow_work(Session& s) {
+    const Worked now{s.tools.tool,      s.scene && s.edit.selected_count() > 0,
+                     s.mesh != nullptr, s.training.live && !s.training.finished,
+                     s.photos.current,  s.scene.get()};
+    if (const std::optional<Tab> tab = tab_of_change(s.worked, now)) s.tab = *tab;
+    s.worked = now;
 }
 
 }  // namespace
@@ -135,23 +219,52 @@ void path_field(const char* label, std::filesystem::path& path) {
 
 void tip(const char* text) {
     if (!ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
+    ImGui::PushStyleVar(ImGuiStyleVar_Alpha, 1);  // also of what is grey
     ImGui::BeginTooltip();
     ImGui::PushTextWrapPos(ImGui::GetFontSize() * 22);
     ImGui::TextUnformatted(text);
     ImGui::PopTextWrapPos();
     ImGui::EndTooltip();
+    ImGui::PopStyleVar();
+}
+
+std::string cut_text(const std::string& text, float width) {
+    if (ImGui::CalcTextSize(text.c_str()).x <= width) return text;
+    std::string cut = text;
+    while (!cut.empty() && ImGui::CalcTextSize((cut + "...").c_str()).x > width) {
+        while (!cut.empty() && (static_cast<unsigned char>(cut.back()) & 0xC0) == 0x80)
+            cut.pop_back();  // the rest of a letter of UTF-8
+        if (!cut.empty()) cut.pop_back();
+    }
+    return cut + "...";
+}
+
+std::optional<Tab> tab_of_change(const Worked& before, const Worked& now) {
+    if (now.run && !before.run) return Tab::training;
+    if (now.scene != before.scene && now.scene != nullptr) return Tab::scene;
+    if (now.tool != before.tool && now.tool == Tool::measure) return Tab::measure;
+    if (now.tool != before.tool && now.tool != Tool::navigate) return Tab::splats;
+    if (now.selected && !before.selected) return Tab::splats;
+    if (now.mesh && !before.mesh) return Tab::mesh;
+    if (now.camera != before.camera && now.camera >= 0) return Tab::camera;
+    return {};
 }
 
 void draw_panels(Session& s) {
     const auto [width, height] = ImGui::GetIO().DisplaySize;
-    empty_hint(s, width, height);
+    follow_work(s);
     draw_panes(s);
     if (s.panels) {
-        draw_measurement(s, static_cast<int>(width), static_cast<int>(height));
-        draw_tools(s, static_cast<int>(width), static_cast<int>(height));
-        if (s.selection.shown) draw_region(s, static_cast<int>(width), static_cast<int>(height));
-        side_panel(s, height);
+        const int w = static_cast<int>(width), h = static_cast<int>(height);
+        draw_guides(s, w, h);
+        draw_measurement(s, w, h);
+        draw_tools(s, w, h);
+        if (s.selection.shown) draw_region(s, w, h);
+        draw_menus(s);
+        draw_toolbar(s, std::round(kMenu * s.gui_scale), height);
+        side_panels(s, width, height);
     }
+    draw_splash(s);
     progress_window(s, width, height);
     open_window(s);
     help_window(s);
@@ -160,13 +273,16 @@ void draw_panels(Session& s) {
     if (s.panels) draw_toasts(s);
 }
 
-float panel_width(const Session& s) {
-    return s.panels ? kWidth * s.gui_scale + 2 * kMargin : 0;
-}
-
 WindowArea free_area(const Session& s, int width, int height) {
-    const int left = static_cast<int>(std::lround(panel_width(s)));
-    return {width, height, width - left >= kLeastFree * width ? left : 0};
+    WindowArea area{width, height};
+    if (!s.panels) return area;
+    const float left = kToolbar * s.gui_scale, right = side_width(s, static_cast<float>(width));
+    if (static_cast<float>(height) > kLeastHeight * kMenu * s.gui_scale)
+        area.top = static_cast<int>(std::lround(kMenu * s.gui_scale));
+    if (static_cast<float>(width) - left - right < kLeastFree * width) return area;
+    area.left = static_cast<int>(std::lround(left));
+    area.right = static_cast<int>(std::lround(right));
+    return area;
 }
 
 }  // namespace darb

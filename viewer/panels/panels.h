@@ -4,6 +4,10 @@
 
 #include <imgui.h>
 
+#include <string>
+
+#include "viewer/gui.h"
+#include "viewer/input.h"
 #include "viewer/session.h"
 
 namespace darb {
@@ -13,20 +17,49 @@ inline constexpr ImGuiSliderFlags kClamped = ImGuiSliderFlags_AlwaysClamp;
 inline constexpr ImGuiSliderFlags kLogarithmic =
     ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp;
 
+// What the tabs of the properties hold.
+void training_panel(Session& session);
 void scene_panel(Session& session);
+void save_panel(Session& session);  // in the tab of the scene
 void display_panel(Session& session);
 void camera_panel(Session& session);
-void performance_panel(Session& session);
-void accuracy_panel(Session& session);
-void effects_panel(Session& session);
 void edit_panel(Session& session);
 void mesh_panel(Session& session);
 void measure_panel(Session& session);
 void path_panel(Session& session);
-void training_panel(Session& session);
+// Folded sections for experts, in the tab of the view.
+void kernel_panel(Session& session);
+void accuracy_panel(Session& session);
+void effects_panel(Session& session);
+void performance_panel(Session& session);
+
+/// The list of what is there, in the dock above the properties.
+void draw_outliner(Session& session);
+/// Menus at the top, and the column of buttons on the left.
+void draw_menus(Session& session);
+void draw_toolbar(Session& session, float top, float height);
+/// A button of a command, with its tip.
+void command_button(Key id, Session& session);
+/// The photos as small pictures, in what is left of the panel; a click looks through the camera of
+/// one.
+void camera_thumbnails(Session& session);
+/// What an empty window shows: files that were opened before, and what to do first.
+void draw_splash(Session& session);
+/// Grid, axes, cameras and colour bars over the picture; clicks on them.
+void draw_guides(Session& session, int width, int height);
 /// Lists all keys where the user asked for them.
 void help_window(Session& session);
 
+/// A colour of the theme as draw lists take it.
+inline ImU32 colour_u32(const ThemeColour& c) {
+    return ImGui::ColorConvertFloat4ToU32(ImVec4(c[0], c[1], c[2], c[3]));
+}
+inline ImU32 axis_colour(int axis) {
+    return colour_u32(theme::theme_colour(palette::kAxes[static_cast<std::size_t>(axis)]));
+}
+
+/// The text, cut at its end so that it is at most this wide, px.
+std::string cut_text(const std::string& text, float width);
 /// Explains the control before it while the pointer rests on it.
 void tip(const char* text);
 

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: MIT
 // The scene that is open, and how it is displayed.
 #include <imgui.h>
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/shaped_kernel.h"
+#include "engine/report/html.h"
 #include "engine/scene/splat_file.h"
+#include "viewer/commands.h"
 #include "viewer/panels/panels.h"
 
 namespace darb {
@@ -49,27 +53,27 @@ void kernel_choice(Session& s) {
 }  // namespace
 
 void scene_panel(Session& s) {
-    if (!s.training.live || s.training.finished) {
-        if (ImGui::Button("Open ...")) s.ask(request::ShowOpen{});
-        tip("Choose a scene in a folder, or one that was opened before (Ctrl+O)");
-    }
-    if (!s.scene || !ImGui::CollapsingHeader("Scene", ImGuiTreeNodeFlags_DefaultOpen)) return;
+    command_button(Key::open, s);
+    if (!s.scene) return;
     const Scene& scene = *s.scene;
     ImGui::TextWrapped("%s", scene_name(scene.file, true).c_str());
     tip(scene.file.string().c_str());
     if (!scene.is_points)
-        ImGui::Text("%zu splats, SH degree %d", scene.model.size() - s.edit.removed_count(),
+        ImGui::Text("%zu splats, colours of degree %d", scene.model.size() - s.edit.removed_count(),
                     scene.model.sh_degree);
-    ImGui::Text("%s, loaded in %.2f s", scene.format.c_str(), scene.load_s);
+    ImGui::TextWrapped("%s, loaded in %.2f s", scene.format.c_str(), scene.load_s);
     if (const double unit = s.edit.facts().metres_per_unit; unit > 0)
         ImGui::Text("a unit is %.4g m", unit);
     for (const std::string& note : scene.notes) ImGui::TextWrapped("%s", note.c_str());
+    if (scene.is_points) return;
+    ImGui::Separator();
+    save_panel(s);
 }
 
 void display_panel(Session& s) {
-    if (!ImGui::CollapsingHeader("Display", ImGuiTreeNodeFlags_DefaultOpen)) return;
     DisplaySettings& d = s.display;
-    constexpr const char* kModes[] = {"picture", "error to photo", "depth", "work per pixel"};
+    constexpr const char* kModes[] = {"picture", "difference from photo", "depth",
+                                      "splats per pixel"};
     if (ImGui::BeginCombo("show", kModes[d.mode])) {
         for (int m = 0; m < 4; ++m) {
             if (m == VIEW_ERROR && s.photos.current < 0) continue;
@@ -77,16 +81,15 @@ void display_panel(Session& s) {
         }
         ImGui::EndCombo();
     }
-    tip("The picture; its error against the photo, as heat; the depth, where near is light; or how "
-        "many splats "
-        "each pixel needs");
+    tip("The picture; its difference from the photo; the depth, where near is light; or how many "
+        "splats each pixel needs. A bar in the picture says what the colours mean");
     if (d.mode == VIEW_ERROR) {
-        ImGui::SliderFloat("hottest at", &d.error_max, 0.02f, 1.0f, "%.2f of white", kLogarithmic);
-        tip("The mean absolute difference of the three channels that gets the hottest colour");
+        ImGui::SliderFloat("lightest at", &d.error_max, 0.02f, 1.0f, "%.2f of white", kLogarithmic);
+        tip("The mean absolute difference of the three channels that gets the lightest colour");
     }
     if (d.mode == VIEW_COUNT) {
-        ImGui::SliderFloat("hottest at", &d.count_max, 10, 10'000, "%.0f splats", kLogarithmic);
-        tip("The number of splats per pixel, counted until it is opaque, that gets the hottest "
+        ImGui::SliderFloat("lightest at", &d.count_max, 10, 10'000, "%.0f splats", kLogarithmic);
+        tip("The number of splats per pixel, counted until it is opaque, that gets the lightest "
             "colour");
     }
     if (s.scene) {
@@ -96,10 +99,24 @@ void display_panel(Session& s) {
         tip("Splats as they are, dots at their centres, or hard ellipses of two standard "
             "deviations");
     }
+    ImGui::ColorEdit3("background", &d.background.x, ImGuiColorEditFlags_NoInputs);
+    tip("The colour where there is no splat, sRGB");
+    ImGui::Checkbox("grid", &s.guides.grid);
+    tip("Draw a grid on the ground over the picture (G)");
+    ImGui::SameLine();
+    ImGui::Checkbox("axes", &s.guides.axes);
+    tip("Draw the axes in the corner; a click on one looks along it");
+    ImGui::SameLine();
+    ImGui::BeginDisabled(s.photos.views.empty());
+    ImGui::Checkbox("cameras", &s.guides.cameras);
+    ImGui::EndDisabled();
+    tip("Draw the cameras of the photos; a click on one looks through it (C)");
+}
+
+void kernel_panel(Session& s) {
+    if (!ImGui::CollapsingHeader("Kernels")) return;
     kernel_choice(s);
     panes_panel(s);
-    ImGui::ColorEdit3("background", &d.background.x);
-    tip("The colour where there is no splat, sRGB");
 }
 
 // The open dialog: the scenes of a folder, and those that were opened last.
@@ -183,46 +200,60 @@ void open_window(Session& s) {
     ImGui::End();
 }
 
-// The list of keys, and what the mouse does.
+// The list of keys, from the table of commands, and what the mouse does.
 
 namespace {
 
-struct HelpRow {
-    const char *input, *does;  // null where input is a heading
+struct HelpLine {
+    std::string input, does;  // no `does`: a heading
 };
 
-constexpr HelpRow kHelp[] = {
-    {"Camera", nullptr},
-    {"left drag", "orbit"},
-    {"right drag", "look around"},
-    {"middle or Shift+left drag", "pan"},
-    {"wheel", "zoom, or change the speed while flying"},
-    {"double click", "orbit around this point"},
-    {"W A S D Q E", "fly"},
-    {"F, L", "frame all, level"},
-    {"[ and ]", "cameras of the data set"},
-    {"Pictures", nullptr},
-    {"drag a line", "move the border between photo and kernels"},
-    {"P", "save a picture"},
-    {"K, space", "add a key frame, play the path"},
-    {"space, .", "during training: pause, do one step"},
-    {"Editing", nullptr},
-    {"1", "orbit with the left button again"},
-    {"2, 3, 4, 5", "select: rectangle, lasso, brush, sphere"},
-    {"6, 7, 8", "move, turn, scale"},
-    {"9", "measure: click points, drag one, click the first to close"},
-    {"Delete while measuring", "take the last point away"},
-    {"Shift, Ctrl while selecting", "add, take away"},
-    {"Ctrl+A, Ctrl+D, Ctrl+I", "select all, none, or the others"},
-    {"Ctrl+H, Ctrl+U", "hide the selection, show everything hidden"},
-    {"Delete", "delete the selection"},
-    {"Ctrl+Z, Ctrl+Y", "undo, redo"},
-    {"Ctrl+S, Ctrl+Q", "save, quit"},
-    {"Ctrl+O, or drop a file", "open a scene"},
-    {"Window", nullptr},
-    {"?, H, F11", "show these keys, hide the panels, full screen"},
-    {"Esc", "stop, cancel, close, leave full screen"},
-};
+std::vector<HelpLine> help_lines() {
+    std::vector<HelpLine> lines{{"Mouse, and keys that are held", ""}};
+    for (const HeldRow& row : held_inputs()) lines.push_back({row.input, row.does});
+    for (std::size_t m = 0; m <= kMenuNames.size(); ++m) {
+        lines.push_back({m < kMenuNames.size() ? kMenuNames[m] : "Always", ""});
+        for (const Command& c : commands())
+            if (const std::string keys = keys_text(c);
+                c.menu == static_cast<Menu>(m) && !keys.empty())
+                lines.push_back({keys, c.name});
+    }
+    return lines;
+}
+
+float widest(const std::vector<HelpLine>& lines, std::string HelpLine::*text) {
+    float width = 0;
+    for (const HelpLine& line : lines)
+        if (!line.does.empty())
+            width = std::max(width, ImGui::CalcTextSize((line.*text).c_str()).x);
+    return width;
+}
+
+// In as many columns as the window has room for.
+void help_columns(float room, float scale) {
+    const std::vector<HelpLine> lines = help_lines();
+    const float input = widest(lines, &HelpLine::input) + 14 * scale;
+    const float column = input + widest(lines, &HelpLine::does) + 24 * scale;
+    const auto columns =
+        static_cast<std::size_t>(std::clamp(std::floor(room / column), 1.0f, 3.0f));
+    const std::size_t rows = (lines.size() + columns - 1) / columns;
+    const ImVec2 at = ImGui::GetCursorPos();
+    const float height = ImGui::GetTextLineHeight() + 4 * scale;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        const ImVec2 place(at.x + column * static_cast<float>(i / rows),
+                           at.y + height * static_cast<float>(i % rows));
+        ImGui::SetCursorPos(place);
+        if (lines[i].does.empty()) {
+            ImGui::TextDisabled("%s", lines[i].input.c_str());
+            continue;
+        }
+        ImGui::TextUnformatted(lines[i].input.c_str());
+        ImGui::SetCursorPos(ImVec2(place.x + input, place.y));
+        ImGui::TextUnformatted(lines[i].does.c_str());
+    }
+    ImGui::SetCursorPos(ImVec2(at.x, at.y + height * static_cast<float>(rows)));
+    ImGui::Dummy(ImVec2(column * static_cast<float>(columns) - 24 * scale, 1));
+}
 
 }  // namespace
 
@@ -231,23 +262,10 @@ void help_window(Session& s) {
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Appearing,
                             ImVec2(0.5f, 0.5f));
-    ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), ImVec2(size.x, size.y));
+    ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), size);
     ImGui::Begin("Keys and mouse", &s.help,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
-    if (ImGui::BeginTable("keys", 2)) {
-        for (const HelpRow& row : kHelp) {
-            ImGui::TableNextRow();
-            ImGui::TableNextColumn();
-            if (row.does == nullptr) {
-                ImGui::TextDisabled("%s", row.input);
-                continue;
-            }
-            ImGui::TextUnformatted(row.input);
-            ImGui::TableNextColumn();
-            ImGui::TextUnformatted(row.does);
-        }
-        ImGui::EndTable();
-    }
+    help_columns(size.x - 40 * s.gui_scale, s.gui_scale);
     ImGui::TextDisabled("%s", s.device_name.c_str());
     ImGui::End();
 }

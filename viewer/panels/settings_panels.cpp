@@ -7,6 +7,7 @@
 #include <numeric>
 #include <string>
 
+#include "viewer/commands.h"
 #include "viewer/panels/panels.h"
 #include "viewer/switches.h"
 
@@ -115,37 +116,23 @@ void up_axis(Session& s) {
 }
 
 void data_set(Session& s) {
-    Photos& p = s.photos;
-    if (p.views.empty()) return;
-    const char* now = p.current < 0 ? "free" : p.views[static_cast<size_t>(p.current)].name.c_str();
-    if (ImGui::BeginCombo("data set", now)) {
-        for (int i = 0; i < static_cast<int>(p.views.size()); ++i) {
-            const View& view = p.views[static_cast<size_t>(i)];
-            ImGui::PushID(i);
-            if (ImGui::Selectable(view.name.c_str(), i == p.current))
-                s.ask(request::ChooseCamera{i});
-            ImGui::PopID();
-        }
-        ImGui::EndCombo();
+    if (s.photos.views.empty()) return;
+    ImGui::Separator();
+    for (const Key id : {Key::last_camera, Key::next_camera}) {
+        command_button(id, s);
+        ImGui::SameLine();
     }
-    tip("Look through a camera of the data set; [ and ] step through them");
-    if (p.current < 0) {
-        ImGui::TextDisabled("[ and ] step through its cameras");
-        return;
-    }
-    if (ImGui::Checkbox("photo beside the picture", &p.compare)) p.failed = false;
-    tip("Show the photo left of a line that can be dragged");
+    ImGui::NewLine();
+    command_button(Key::compare, s);
+    camera_thumbnails(s);
 }
 
 }  // namespace
 
 void camera_panel(Session& s) {
-    if (!ImGui::CollapsingHeader("Camera", ImGuiTreeNodeFlags_DefaultOpen)) return;
-    if (ImGui::Button("Frame all")) s.ask(request::FrameAll{});
-    tip("Show the whole scene beside this panel (F)");
+    command_button(Key::frame_all, s);
     ImGui::SameLine();
-    if (ImGui::Button("Take picture")) s.ask(request::TakePicture{});
-    tip("Write darb_001.png, or the next free name, to the current folder (P)");
+    command_button(Key::picture, s);
     if (s.photos.current < 0) {
         float degrees = static_cast<float>(glm::degrees(s.navigation.fov_y));
         if (ImGui::SliderFloat("field of view", &degrees, 10, 120, "%.0f°", kClamped))
@@ -194,7 +181,6 @@ void performance_panel(Session& s) {
 // Camera paths: key frames, playing, export.
 
 void path_panel(Session& s) {
-    if (!ImGui::CollapsingHeader("Camera path")) return;
     PathState& p = s.path;
     ImGui::Text("%zu key frames, %.1f s", p.path.keys.size(), p.path.duration());
     if (ImGui::Button("Add")) p.path.add(s.navigation, p.seconds_per_key);
@@ -239,46 +225,6 @@ void path_panel(Session& s) {
     if (ImGui::Button("Export frames and video")) s.ask(request::ExportPath{});
     tip("Write PNG frames, and video.mp4 if ffmpeg is installed");
     ImGui::EndDisabled();
-}
-
-// A training run that is followed live: its curves, pausing, single steps.
-
-namespace {
-
-void curve(const char* label, const std::vector<float>& values, const char* format, float scale) {
-    if (values.empty()) return;
-    char text[64];
-    std::snprintf(text, sizeof text, format, static_cast<double>(values.back()));
-    ImGui::PlotLines("", values.data(), static_cast<int>(values.size()), 0, text, FLT_MAX, FLT_MAX,
-                     ImVec2(230 * scale, 50 * scale));
-    ImGui::SameLine();
-    ImGui::TextUnformatted(label);
-}
-
-}  // namespace
-
-void training_panel(Session& s) {
-    TrainingCurves& t = s.training;
-    if (!t.live || !ImGui::CollapsingHeader("Training", ImGuiTreeNodeFlags_DefaultOpen)) return;
-    ImGui::Text("iteration %d of %d", t.iteration, t.last_iteration);
-    ImGui::BeginDisabled(t.finished);
-    if (ImGui::Button(t.paused ? "Continue" : "Pause")) t.paused = !t.paused;
-    tip("Pause or continue the training (space)");
-    ImGui::SameLine();
-    if (ImGui::Button("Step")) {
-        t.paused = true;
-        ++t.steps_to_go;
-    }
-    tip("Train one iteration, then pause (.)");
-    ImGui::EndDisabled();
-    ImGui::SameLine();
-    ImGui::TextDisabled(t.finished ? "finished" : "closing leaves it running");
-    ImGui::PushID("curves");
-    curve("loss", t.loss, "%.4f", s.gui_scale);
-    curve("PSNR", t.psnr_db, "%.2f dB", s.gui_scale);
-    curve("held out", t.held_out_psnr_db, "%.2f dB", s.gui_scale);
-    curve("splats", t.splats, "%.0f", s.gui_scale);
-    ImGui::PopID();
 }
 
 }  // namespace darb

@@ -67,8 +67,6 @@ void make_one(Session& s) {
 }  // namespace
 
 void mesh_panel(Session& s) {
-    if (!s.scene || !ImGui::CollapsingHeader("Mesh")) return;
-    ImGui::PushID("mesh");
     if (s.mesh) {
         ImGui::Text("%zu faces%s%s", s.mesh->mesh.face_count(), s.mesh->file.empty() ? "" : ", ",
                     s.mesh->file.filename().string().c_str());
@@ -90,7 +88,6 @@ void mesh_panel(Session& s) {
     if (ImGui::Button("Close mesh")) s.ask(request::CloseMesh{});
     tip("Show the splats alone again");
     ImGui::EndDisabled();
-    ImGui::PopID();
 }
 
 // Measuring.
@@ -144,8 +141,6 @@ void scale_row(Session& s, const MeasuredLengths& lengths) {
 }  // namespace
 
 void measure_panel(Session& s) {
-    if (!s.scene || !ImGui::CollapsingHeader("Measure")) return;
-    ImGui::PushID("measure");
     bool on = s.tools.tool == Tool::measure;
     if (ImGui::Checkbox("click points (9)", &on))
         choose_tool(on ? Tool::measure : Tool::navigate, s);
@@ -169,7 +164,6 @@ void measure_panel(Session& s) {
             tip("In units of the file");
         }
     }
-    ImGui::PopID();
 }
 
 namespace {

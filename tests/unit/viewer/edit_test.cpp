@@ -255,11 +255,11 @@ TEST(ViewCamera, Fitted_photo_camera_centres_its_frame) {
     c.fx = c.fy = 150;
     c.cx = 52;
     c.cy = 98;
-    const Camera f = fitted(c, 800, 400);
+    const Camera f = fitted(c, {800, 400});
     EXPECT_DOUBLE_EQ(f.fx, 300);
     EXPECT_DOUBLE_EQ(f.cx, 52 * 2 + 300);
     EXPECT_DOUBLE_EQ(f.cy, 196);
-    const Camera same = fitted(c, 100, 200);
+    const Camera same = fitted(c, {100, 200});
     EXPECT_EQ(same.fx, c.fx);
     EXPECT_EQ(same.cx, c.cx);
 }
