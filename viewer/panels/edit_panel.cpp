@@ -94,30 +94,28 @@ void tool_choice(Session& s) {
     tip("Radius of the brush on the screen");
 }
 
-void select(const SplatSet& mask, Session& s) {
+void select(const Selector& what, Session& s) {
     const ImGuiIO& io = ImGui::GetIO();
-    show_edit(s.edit.select(mask, io.KeyShift  ? Combine::add
-                                  : io.KeyCtrl ? Combine::subtract
-                                               : Combine::replace),
-              s);
+    perform_edit(edits::Select{what, io.KeyShift  ? Combine::add
+                                     : io.KeyCtrl ? Combine::subtract
+                                                  : Combine::replace},
+                 s);
 }
 
 void selection_buttons(Session& s) {
-    const SplatModel& model = s.scene->model;
     ImGui::Text("%zu selected, %zu hidden, %zu deleted", s.edit.selected_count(),
                 s.edit.hidden_count(), s.edit.removed_count());
-    if (ImGui::Button("All")) select(SplatSet(model.size(), 1), s);
+    if (ImGui::Button("All")) select(by::Everything{}, s);
     tip("Ctrl+A");
     ImGui::SameLine();
-    if (ImGui::Button("None")) select(SplatSet(model.size(), 0), s);
+    if (ImGui::Button("None")) select(by::Nothing{}, s);
     tip("Ctrl+D");
     ImGui::SameLine();
     if (ImGui::Button("Invert")) show_edit(s.edit.invert_selection(), s);
     tip("Ctrl+I");
     ImGui::SameLine();
     if (ImGui::Button("Grow"))
-        show_edit(
-            s.edit.select(grown(model, s.edit.selected(), double{s.tools.grow}), Combine::add), s);
+        perform_edit(edits::Select{by::Near{double{s.tools.grow}}, Combine::add}, s);
     tip("Add all splats that are nearer to a selected one than the distance on the right");
     ImGui::SameLine();
     ImGui::SetNextItemWidth(70 * s.gui_scale);
@@ -202,7 +200,7 @@ void select_by_value(Session& s) {
     tip("Lowest and highest opacity, 0 to 1");
     ImGui::SameLine();
     if (ImGui::Button("opacity"))
-        select(by_opacity(m, double{t.opacity[0]}, double{t.opacity[1]}), s);
+        select(by::Opacity{double{t.opacity[0]}, double{t.opacity[1]}}, s);
     tip("Select the splats in this range; Shift adds, Ctrl takes away");
     const auto place = [&](float size) {
         return h.most > h.least && size > 0
@@ -216,7 +214,7 @@ void select_by_value(Session& s) {
                            "%.3g", kClamped);
     tip("Smallest and largest size: the largest standard deviation, in units of the scene");
     ImGui::SameLine();
-    if (ImGui::Button("size")) select(by_scale(m, double{t.scale[0]}, double{t.scale[1]}), s);
+    if (ImGui::Button("size")) select(by::Size{double{t.scale[0]}, double{t.scale[1]}}, s);
     tip("Select the splats in this range; Shift adds, Ctrl takes away");
     ImGui::ColorEdit3("##colour", &t.colour.x, ImGuiColorEditFlags_NoInputs);
     tip("The colour to look for, sRGB");
@@ -225,7 +223,7 @@ void select_by_value(Session& s) {
     ImGui::SliderFloat("##tolerance", &t.tolerance, 0, 1, "within %.2f", kClamped);
     tip("How far each channel may be from it, 0 to 1");
     ImGui::SameLine();
-    if (ImGui::Button("colour")) select(by_colour(m, glm::dvec3(t.colour), double{t.tolerance}), s);
+    if (ImGui::Button("colour")) select(by::Colour{glm::dvec3(t.colour), double{t.tolerance}}, s);
     tip("Select by the colour without harmonics; Shift adds, Ctrl takes away");
     ImGui::TreePop();
 }
@@ -234,14 +232,13 @@ void select_by_value(Session& s) {
 void clean_up(Session& s) {
     if (!ImGui::TreeNode("Clean up")) return;
     ToolState& t = s.tools;
-    const SplatModel& m = s.scene->model;
     const float width = 130 * s.gui_scale;
     ImGui::TextDisabled("Each selects; look, then press Delete.");
     ImGui::SetNextItemWidth(width);
     ImGui::SliderFloat("##isolated", &t.isolated, 0.0001f, 0.5f, "below %.4f", kLogarithmic);
     tip("Share of the heaviest part, by opacity times area");
     ImGui::SameLine();
-    if (ImGui::Button("isolated parts")) select(isolated_splats(m, double{t.isolated}), s);
+    if (ImGui::Button("isolated parts")) select(by::Isolated{double{t.isolated}}, s);
     tip("Parts that touch nothing else and are light; Shift adds, Ctrl takes away");
     ImGui::SetNextItemWidth(width / 2 - 2);
     ImGui::SliderFloat("##faint", &t.haze_opacity, 0.01f, 0.5f, "%.2f", kClamped);
@@ -251,8 +248,7 @@ void clean_up(Session& s) {
     ImGui::SliderFloat("##large", &t.haze_size, 1, 50, "%.1f x", kLogarithmic);
     tip("Least size of haze, in times of the median size");
     ImGui::SameLine();
-    if (ImGui::Button("haze"))
-        select(hazy_splats(m, double{t.haze_opacity}, double{t.haze_size}), s);
+    if (ImGui::Button("haze")) select(by::Haze{double{t.haze_opacity}, double{t.haze_size}}, s);
     tip("Splats that are large and faint; Shift adds, Ctrl takes away");
     ImGui::SetNextItemWidth(width);
     ImGui::SliderInt("##views", &t.looked_through, 1, 20, "%d photos", kClamped);
@@ -287,7 +283,7 @@ void select_by_region(Session& s) {
     }
     tip("The pivot is the point that the camera turns around");
     if (moved) s.selection.shown = true;
-    if (ImGui::Button("Select")) select(in_region(s.scene->model, s.selection.region), s);
+    if (ImGui::Button("Select")) select(s.selection.region, s);
     tip("Select the splats whose centre is inside; Shift adds, Ctrl takes away");
     ImGui::SameLine();
     if (ImGui::Button("Crop to it"))
@@ -332,15 +328,26 @@ void edit_panel(Session& s) {
     select_by_value(s);
     select_by_region(s);
     if (ImGui::Button("Merge a scene ...")) s.ask(request::ShowOpen{true});
-    tip("Add the splats of another file to this scene, at the positions that they have there");
+    tip("Add the splats of another file to this scene as a layer, at the positions that they have "
+        "there");
+    ImGui::SameLine();
+    if (ImGui::Button("Copy")) perform_edit(edits::Duplicate{}, s);
+    tip("Add a copy of the selection as a layer");
+    ImGui::SameLine();
+    if (ImGui::Button("Parts")) perform_edit(edits::Select{by::Connected{}, Combine::add}, s);
+    tip("Select whole parts: everything that touches the selection, or touches what does");
     path_field("file", s.save_file);
     tip("The ending of the name decides the format");
     ImGui::SameLine();
-    if (ImGui::Button("Save")) s.ask(request::Save{});
-    tip("Save the edited scene (Ctrl+S)");
+    if (ImGui::Button("Save")) s.ask(request::SaveScene{});
+    tip("Save the visible layers together as one file; Ctrl+S does the same where there is one "
+        "layer and no project");
     format_choice(s);
     if (ImGui::Button("Save as web page")) s.ask(request::SavePage{});
     tip("Write an .html file for any browser beside the file");
+    ImGui::SameLine();
+    if (ImGui::Button("Save edits as script")) s.ask(request::SaveScript{});
+    tip("Write all edits beside the file, for darb edit to repeat them");
     ImGui::Checkbox("save upright", &s.save_upright);
     tip("Turn the saved scene so that up is -y, as most programs expect");
     ImGui::PopID();

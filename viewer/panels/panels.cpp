@@ -68,8 +68,13 @@ void leaving_window(Session& s, float width, float height) {
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
     if (unsaved_edits(s)) {
         ImGui::TextUnformatted("The edits of this scene have not been saved.");
-        path_field("file", s.save_file);
-        tip("The ending of the name decides the format");
+        if (keeps_project(s)) {
+            path_field("project", s.project.to_save);
+            tip("Keeps the layers with all edits");
+        } else {
+            path_field("file", s.save_file);
+            tip("The ending of the name decides the format");
+        }
     }
     if (unsaved_mesh(s)) {
         ImGui::TextUnformatted("The mesh that was made has not been saved.");
@@ -103,6 +108,7 @@ void side_panel(Session& s, float height) {
     ImGui::Begin("darb", nullptr, ImGuiWindowFlags_AlwaysAutoResize);
     ImGui::PushItemWidth(150 * s.gui_scale);
     scene_panel(s);
+    outliner(s);
     training_panel(s);
     display_panel(s);
     camera_panel(s);
@@ -111,6 +117,7 @@ void side_panel(Session& s, float height) {
     effects_panel(s);
     mesh_panel(s);
     measure_panel(s);
+    notes_panel(s);
     edit_panel(s);
     path_panel(s);
     if (ImGui::Button("Keys and mouse (?)")) s.help = !s.help;
@@ -148,6 +155,7 @@ void draw_panels(Session& s) {
     draw_panes(s);
     if (s.panels) {
         draw_measurement(s, static_cast<int>(width), static_cast<int>(height));
+        draw_notes(s, static_cast<int>(width), static_cast<int>(height));
         draw_tools(s, static_cast<int>(width), static_cast<int>(height));
         if (s.selection.shown) draw_region(s, static_cast<int>(width), static_cast<int>(height));
         side_panel(s, height);

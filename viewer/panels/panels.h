@@ -20,6 +20,11 @@ void performance_panel(Session& session);
 void accuracy_panel(Session& session);
 void effects_panel(Session& session);
 void edit_panel(Session& session);
+/// The list of layers.
+void outliner(Session& session);
+void notes_panel(Session& session);
+/// Labels of notes over the picture.
+void draw_notes(const Session& session, int width, int height);
 void mesh_panel(Session& session);
 void measure_panel(Session& session);
 void path_panel(Session& session);
