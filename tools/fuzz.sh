@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Fuzzes every reader of files with libFuzzer (clang): splat scenes, meshes, photos, COLMAP, transforms.json, checkpoints; and, where
+# Fuzzes every reader of files with libFuzzer (clang): splat scenes, meshes, photos, COLMAP, transforms.json, checkpoints, projects; and, where
 # the tests are built, the pipeline with random scenes that hold poison (tests/pipeline/scene_fuzz_test.cpp).
 #   tools/fuzz.sh [MINUTES]      for each reader (default 10; fractions work); the test gate runs 0.02
 # Seeds are small whole files of every format and version (tests/fuzz/make_seeds.cpp). What was learned stays in
@@ -9,7 +9,7 @@ set -euo pipefail
 case ${1:-} in -h | --help) sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 
-readers="ply compressed_ply dot_splat spz sog streamed_sog gltf ksplat lcc usda las splat_file mesh photo colmap transforms checkpoint kernel"
+readers="ply compressed_ply dot_splat spz sog streamed_sog gltf ksplat lcc usda las splat_file mesh photo colmap transforms checkpoint kernel project"
 minutes=${1:-10}
 seconds=$(awk -v m="$minutes" 'BEGIN { s = m * 60; print (s < 1 ? 1 : int(s)) }')
 build=build-asan

@@ -3,11 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
+#include "engine/scene/splat_file.h"
 #include "viewer/tools.h"
 
 namespace darb {
@@ -36,14 +38,26 @@ ByKind(Kinds...) -> ByKind<Kinds...>;
 void Controller::take_loaded() {
     session_->attempt([&] {
         std::optional<LoadedScene> loaded = document_->take_loaded();
-        if (!loaded) return;
-        if (loaded->merges && session_->scene)
-            merge(std::move(*loaded));
-        else if (document_->edited_meanwhile())
-            session_->leaving = Leaving{false, loaded->asked_for};
-        else
-            show(std::move(*loaded));
+        if (loaded) take(std::move(*loaded));
     });
+    session_->attempt([&] { document_->load_next(); });
+}
+
+void Controller::take(LoadedScene loaded) {
+    if (loaded.merges && session_->scene)
+        merge(std::move(loaded));
+    else if (document_->edited_meanwhile())
+        session_->leaving = Leaving{false, loaded.asked_for};
+    else
+        show(std::move(loaded));
+}
+
+void Controller::finish_loading() {
+    while (document_->loading()) {
+        if (std::optional<LoadedScene> loaded = document_->take_loaded(true))
+            take(std::move(*loaded));
+        document_->load_next();
+    }
 }
 
 void Controller::take_pictures_of_run() {
@@ -56,9 +70,11 @@ void Controller::take_pictures_of_run() {
 // The device's copy is made first: when that fails, the previous scene is still there.
 void Controller::show(LoadedScene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded.scene));
+    const bool edited = scene->project != nullptr;
     painter_->open(*scene);
     painter_->begin_scene(document_->show(std::move(scene), loaded.asked_for, loaded.dropped));
     Session& s = *session_;
+    if (edited) show_edits();
     if (s.scene->mesh) painter_->show_mesh(*std::exchange(s.scene->mesh, std::nullopt), true);
     if (const fs::path mesh = document_->take_mesh_to_open(); !mesh.empty()) open_mesh(mesh);
 }
@@ -66,8 +82,13 @@ void Controller::show(LoadedScene loaded) {
 void Controller::merge(LoadedScene loaded) {
     Session& s = *session_;
     const std::string from = loaded.scene.file.filename().string();
+    if (loaded.scene.project)
+        throw Error(from, "is a project, and a project cannot be a layer of another",
+                    "Save its layers together as one file, and add that.");
     const Bounds added = loaded.scene.subject;
-    const std::size_t count = document_->merge(std::move(loaded.scene.model));
+    const double unit = loaded.scene.model.metres_per_unit, ours = s.edit.facts().metres_per_unit;
+    const std::size_t count = document_->merge(std::move(loaded.scene.model),
+                                               {loaded.scene.file, scene_name(loaded.asked_for)});
     try {
         show_edits();
     } catch (const std::exception&) {  // no room on the device: everything stays as it was
@@ -76,15 +97,24 @@ void Controller::merge(LoadedScene loaded) {
         throw;
     }
     if (count > 0) s.ask(request::Frame{added.centre, added.radius});
-    s.tell(
-        fmt::format("merged {} splats of {}: they are selected, and 6, 7 and 8 move, turn and "
-                    "scale them",
-                    count, from));
+    std::string said = fmt::format(
+        "merged {} splats of {}: they are selected, and 6, 7 and 8 move, turn and "
+        "scale them",
+        count, from);
+    if (unit > 0 && ours > 0 && std::abs(unit / ours - 1) > 1e-6)
+        said += fmt::format(
+            "\nA unit of it is {:.4g} m, and of the scene {:.4g} m: scale it by "
+            "{:.4g} to have it in its true size.",
+            unit, ours, unit / ours);
+    for (const std::string& loss : s.edit.losses_together()) said += "\n" + loss;
+    s.outliner.active = static_cast<int>(s.edit.layers().size()) - 1;
+    s.tell(said);
 }
 
 bool Controller::take_input(const Input& input, const ControlFrame& frame) {
     Session& s = *session_;
-    for (const fs::path& path : input.dropped) s.attempt([&] { drop(path); });
+    const bool adds = input.shift || s.outliner.has(input.x, input.y);
+    for (const fs::path& path : input.dropped) s.attempt([&] { drop(path, adds); });
     if (!frame.panels_want_keys)
         for (const Key key : input.pressed) press(key, s);
     document_->follow_photo(frame.width, frame.height);
@@ -114,7 +144,10 @@ void Controller::act(int width, int height) {
         [&](request::ShowOpen open) { show_open(open.merges); },
         [&](const request::Open& open) { open_file(open.file, open.merges); },
         [&](request::ShowEdits) { show_edits(); },
-        [&](request::Save) { document_->save_scene(*device_); },
+        [&](request::Save) { document_->save(*device_); },
+        [&](const request::SaveScene& save) { document_->save_scene(*device_, save.layer); },
+        [&](request::SaveProject) { document_->save_project(); },
+        [&](request::SaveScript) { document_->save_script(); },
         [&](request::SavePage) { document_->save_page(*device_, width, height); },
         [&](request::LoadPath) { document_->load_path(); },
         [&](request::SavePath) { document_->save_path(); },
@@ -160,13 +193,15 @@ double Controller::expire_toasts() {
 }
 
 // Handles a file that a user drops. It is refused during a run, and unsaved edits lead to a
-// question first.
-void Controller::drop(const fs::path& path) {
+// question first, unless it is added as a layer.
+void Controller::drop(const fs::path& path, bool adds) {
     Session& s = *session_;
     if (s.training.live && !s.training.finished)
         s.tell("A run is shown; files can be opened when it is over.");
     else if (s.scene && !s.scene->is_points && is_mesh_file(path))
         open_mesh(path);  // it is shown with the scene
+    else if (adds && s.scene)
+        document_->add_later(path);
     else if (unsaved_edits(s) || unsaved_mesh(s))
         s.leaving = Leaving{false, path};
     else
@@ -259,7 +294,7 @@ void Controller::leave() {
 // Where saving fails, the viewer stays open and shows the message.
 void Controller::save_and_leave() {
     const std::optional<Leaving> leaving = std::exchange(session_->leaving, std::nullopt);
-    if (unsaved_edits(*session_)) document_->save_scene(*device_);
+    if (unsaved_edits(*session_)) document_->save(*device_);
     if (unsaved_mesh(*session_)) document_->save_mesh();
     session_->leaving = leaving;
     leave();

@@ -20,6 +20,8 @@ class Controller {
 
     /// Takes the result of a load that ended since the last frame.
     void take_loaded();
+    /// Waits for all loads, also of scenes to add. Throws their Error.
+    void finish_loading();
     /// Takes the pictures that a running training has drawn since the last frame.
     void take_pictures_of_run();
     /// Shows what was loaded. Throws Error and keeps the current scene.
@@ -33,7 +35,8 @@ class Controller {
     double expire_toasts();
 
   private:
-    void drop(const std::filesystem::path& path);
+    void take(LoadedScene loaded);
+    void drop(const std::filesystem::path& path, bool adds = false);
     void show_open(bool merges);
     void open_file(const std::filesystem::path& file, bool merges);
     void merge(LoadedScene loaded);

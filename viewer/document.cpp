@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numeric>
+#include <string_view>
 #include <utility>
 
 #include "engine/core/error.h"
@@ -19,6 +20,7 @@
 #include "engine/publish/device_clusters.h"
 #include "engine/publish/web_page.h"
 #include "engine/raster/forward_options.h"
+#include "engine/scene/edit_script.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/subject.h"
@@ -46,6 +48,12 @@ std::vector<View> without_shutters(std::vector<View> views) {
 // Edits are saved beside the scene, in its format where that can be written. Those of a run go into
 // its output folder, where its cameras are.
 fs::path edited_name(const fs::path& file) {
+    if (is_project_file(file)) {
+        constexpr std::size_t kEnding = std::string_view(".darb.json").size();
+        const std::string name = file.filename().string();
+        return fs::path(file).replace_filename(name.substr(0, name.size() - kEnding) +
+                                               "_edited.ply");
+    }
     const fs::path run = run_of_scene(file);
     if (!run.empty()) return run / (scene_name(file) + "_edited.ply");
     const std::string stem = stem_to_write(file),
@@ -68,6 +76,7 @@ Document::Document(Session& session, ViewerOptions options)
       loader_(options_.resolve, options_.wake),
       remembered_(options_.up_list),
       recent_(options_.recent_list) {
+    for (const fs::path& path : options_.more) to_add_.push_back({path, false});
     session.photos.views = without_shutters(options_.views);
     session.navigation.set_up(start_up(options_));
     session.display.accuracy = options_.accuracy;
@@ -76,13 +85,22 @@ Document::Document(Session& session, ViewerOptions options)
 }
 
 void Document::load(const fs::path& path, bool dropped, bool merges) {
+    if (dropped && !merges) to_add_.clear();
     loader_.start(path, dropped, merges, dropped ? StoredUnits{} : options_.units);
     edit_at_load_ = session_->edit.content();
     session_->error.clear();
     if (dropped) session_->note.clear();
 }
 
+void Document::load_next() {
+    if (loading() || to_add_.empty() || !session_->scene) return;
+    const ToAdd next = to_add_.front();
+    to_add_.pop_front();
+    load(next.path, next.dropped, true);
+}
+
 void Document::cancel_load() {
+    to_add_.clear();
     loader_.cancel();
     session_->progress.load = -1;
 }
@@ -118,7 +136,7 @@ bool Document::show(std::unique_ptr<Scene> scene, const fs::path& asked, bool dr
     session_->title = scene_name(asked, true) + " - darb";
     const Scene& s = *session_->scene;
     session_->sh_degree = s.model.sh_degree;
-    session_->edit = Edit(s.model.size(), s.model.metres_per_unit);
+    begin_edits(*session_->scene, asked);
     session_->tools = {};
     session_->tools.grow = static_cast<float>(s.subject.radius / 50);
     session_->tools.scale[1] = static_cast<float>(s.subject.radius / 10);
@@ -131,6 +149,10 @@ bool Document::show(std::unique_ptr<Scene> scene, const fs::path& asked, bool dr
     session_->selection.region = {Region::Shape::box, s.subject.centre,
                                   glm::dvec3(s.subject.radius)};
     session_->save_file = edited_name(s.file);
+    session_->project.to_save =
+        s.project
+            ? s.file
+            : fs::path(session_->save_file).replace_filename(scene_name(s.file) + ".darb.json");
     session_->mesh_file = session_->save_file.parent_path() / (scene_name(s.file) + "_mesh.glb");
     session_->mesh_wish = {};
     session_->fly_speed = s.subject.radius / 2;
@@ -143,22 +165,65 @@ bool Document::show(std::unique_ptr<Scene> scene, const fs::path& asked, bool dr
     if (first) session_->navigation.level();
     first_look(of_run);
     set_pivot();
+    if (s.project && take_project(s.project->project, *session_))
+        take_back<request::FrameAll>(session_->requests);
+    session_->scene->project.reset();
     return of_run;
 }
 
-std::size_t Document::merge(SplatModel added) {
+void Document::begin_edits(Scene& scene, const fs::path& asked) {
+    Session& s = *session_;
+    s.project = {};
+    s.outliner = {};
+    s.note_draft = {};
+    s.project.first_file = scene.file;
+    s.project.first_name = scene_name(asked);
+    s.edit = Edit(scene.model, s.project.first_name, scene.file);
+    drawn_model_ = 0;
+    s.project.cameras = std::exchange(options_.cameras, {});
+    if (!scene.project) return;
+    const ProjectLayer& layer = scene.project->project.layers.front();
+    s.edit = std::move(scene.project->edit);
+    s.edit.mark_saved();
+    drawn_model_ = s.edit.model_version();
+    s.project.file = scene.file;
+    s.project.first_file = layer.file;
+    s.project.first_name = layer.name.empty() ? scene_name(layer.file) : layer.name;
+}
+
+std::size_t Document::merge(SplatModel added, const edits::Add& source) {
     Session& s = *session_;
     if (s.edit.transforms()) choose_tool(Tool::navigate, s);
-    return s.edit.merge(std::move(added), s.scene->model);
+    return s.edit.merge(std::move(added), s.scene->model, source);
 }
 
 void Document::follow_edits() {
     Session& s = *session_;
+    draw_as_edited();
     if (s.edit.transforms() || s.edit.model_version() == measured_model_) return;
     measure_scene(*s.scene);
     find_subject(*s.scene);
     show_degree(s.scene->model.sh_degree);
     measured_model_ = s.edit.model_version();
+}
+
+// Layers of different kernels are drawn as Gaussians, and as they are again where only one kernel
+// is left.
+void Document::draw_as_edited() {
+    Session& s = *session_;
+    if (s.edit.model_version() == drawn_model_) return;
+    drawn_model_ = s.edit.model_version();
+    Scene& scene = *s.scene;
+    const LayerLook before = look_of(scene.shown());
+    scene.drawn = s.edit.drawn_otherwise(scene.model);
+    const LayerLook now = look_of(scene.shown());
+    if (now == LayerLook{s.own.kernel, s.own.footprint, s.own.effects.antialias} && now == before)
+        return;
+    for (DisplaySettings* d : {&s.display, &s.own}) {
+        d->kernel = now.kernel;
+        d->footprint = now.footprint;
+        d->effects.antialias = now.antialias;
+    }
 }
 
 // Looks through a camera of the data set where there is one, otherwise from outside and upright.
@@ -299,8 +364,8 @@ void Document::find_own_cameras(const std::filesystem::path& scene,
 // Shows the scene as its file says, except where the command line asks for something else.
 void Document::show_as_meant(const Scene& s, bool first) {
     DisplaySettings& d = session_->display;
-    d.kernel = s.model.kernel;
-    d.footprint = s.model.footprint;
+    d.kernel = s.shown().kernel;
+    d.footprint = s.shown().footprint;
     d.sh_degree = s.model.sh_degree;
     d.effects = {};
     d.effects.antialias = s.model.antialias;
@@ -310,11 +375,11 @@ void Document::show_as_meant(const Scene& s, bool first) {
     session_->own = d;
     session_->measured.clear();
     session_->plan = plan_rendering(
-        s.model, session_->photos.views,
+        s.shown(), session_->photos.views,
         {.depth = d.mode == VIEW_DEPTH, .near_plane = d.near_plane, .free_camera = true},
         options_.effects);
     follow_plan();
-    const FrameAccuracy wanted = frame_accuracy(options_.accuracy, s.model);
+    const FrameAccuracy wanted = frame_accuracy(options_.accuracy, s.shown());
     d.footprint = wanted.footprint;
     d.sh_degree = std::min(d.sh_degree, wanted.sh_degree);
     const bool depth = session_->plan->on(EFFECT_DEPTH);
@@ -411,24 +476,80 @@ void Document::save_path() {
     session_->tell("path in " + p.file.string());
 }
 
-void Document::save_scene(Device& device) {
+void Document::save(Device& device) {
+    if (!session_->scene) return;
+    if (keeps_project(*session_))
+        save_project();
+    else
+        save_scene(device);
+}
+
+void Document::save_project() {
+    Session& s = *session_;
+    fs::path& file = s.project.to_save;
+    if (!is_project_file(file))
+        throw Error(file.string(), "is not the name of a project",
+                    "Let it end in .darb.json. Section Edit saves one file of splats.");
+    saved_.check(file);
+    write_project(file, project_of_session(s));
+    saved_.wrote(file);
+    s.project.file = file;
+    s.edit.mark_saved();
+    s.path.mark_saved();
+    s.tell(fmt::format("saved the project of {} layer{} to {}", s.edit.layers().size(),
+                       s.edit.layers().size() == 1 ? "" : "s", file.string()));
+}
+
+void Document::save_script() {
     Session& s = *session_;
     if (!s.scene) return;
-    const std::optional<SplatFormat> format = format_to_write(s.save_file);
+    const fs::path file =
+        fs::path(s.save_file).replace_filename(stem_to_write(s.save_file) + ".edits.json");
+    saved_.check(file);
+    const std::vector<EditOperation> operations = s.edit.operations();
+    write_edit_script(file, operations);
+    saved_.wrote(file);
+    s.tell(fmt::format("saved {} edits to {}", operations.size(), file.string()));
+}
+
+namespace {
+
+// A name of a layer may have letters that a file name cannot have.
+fs::path file_of_layer(const fs::path& file, const std::string& layer) {
+    const std::string stem = stem_to_write(file), whole = file.filename().string();
+    std::string name = layer;
+    for (char& c : name)
+        if (std::string_view("/\\:*?\"<>|").find(c) != std::string_view::npos ||
+            static_cast<unsigned char>(c) < ' ')
+            c = '_';
+    return fs::path(file).replace_filename(stem + "_" + name + whole.substr(stem.size()));
+}
+
+}  // namespace
+
+void Document::save_scene(Device& device, const std::string& layer) {
+    Session& s = *session_;
+    if (!s.scene) return;
+    const fs::path file = layer.empty() ? s.save_file : file_of_layer(s.save_file, layer);
+    const std::optional<SplatFormat> format = format_to_write(file);
     if (!format)
-        throw Error(s.save_file.string(), "its ending names no format to write",
+        throw Error(file.string(), "its ending names no format to write",
                     "Use " + endings_to_write() + ".");
-    saved_.check(s.save_file);
-    SplatModel model = s.edit.apply(s.scene->model);
+    saved_.check(file);
+    SplatModel model =
+        layer.empty() ? s.edit.apply(s.scene->model)
+                      : s.edit.apply(s.scene->model, s.edit.layers()[s.edit.layer_named(layer)]);
     if (s.save_upright || s.edit.facts().ground)
         transform_splats({.turn = turn_to_up(s.navigation.up)}, model);
     DeviceClusters clusters(device);
     EncodeOptions options;
     options.assign_rows = clusters.assign_rows();
-    write_encoded(s.save_file, encode_scene(*format, model, s.save_file.string(), options));
-    saved_.wrote(s.save_file);
-    s.edit.mark_saved();
-    std::string said = fmt::format("saved {} splats to {}", model.size(), s.save_file.string());
+    write_encoded(file, encode_scene(*format, model, file.string(), options));
+    saved_.wrote(file);
+    if (!keeps_project(s)) s.edit.mark_saved();
+    std::string said = fmt::format("saved {} splats to {}", model.size(), file.string());
+    if (layer.empty())
+        for (const std::string& loss : s.edit.losses_together()) said += "\n" + loss;
     for (const std::string& loss : losses_of(*format, model)) said += "\n" + loss;
     s.tell(said);
 }

@@ -4,6 +4,7 @@
 // what of it has been saved. It draws nothing.
 #pragma once
 
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -26,8 +27,10 @@ struct ViewerOptions {
     StoredUnits units;           // the units of the scenes that `open` names
     bool quiet = false;          // whether to stay silent about what was loaded
     float gui_scale = 0;         // size of the panels; 0: as the display prefers
-    Accuracy accuracy;           // the accuracy to start with
-    EffectChoice effects;        // applied on top of what a scene asks for
+    std::vector<std::filesystem::path> more;  // scenes to add to the first one, as layers
+    std::filesystem::path cameras;            // where `views` come from; empty: found
+    Accuracy accuracy;                        // the accuracy to start with
+    EffectChoice effects;                     // applied on top of what a scene asks for
     /// Maps a path to the file that it means (an output folder means its last scene). Throws Error.
     std::function<std::filesystem::path(const std::filesystem::path&)> resolve;
     /// Finds cameras that lie beside a scene, for one that is dropped. Without such a function the
@@ -51,6 +54,10 @@ class Document {
     /// on the command line. Throws Error.
     void load(const std::filesystem::path& path, bool dropped, bool merges = false);
     bool loading() const { return loader_.loading(); }
+    /// Adds this scene as a layer when those that wait before it are there.
+    void add_later(const std::filesystem::path& path) { to_add_.push_back({path, true}); }
+    /// Starts the load of the next scene to add, where none is being loaded. Throws Error.
+    void load_next();
     void cancel_load();
     /// The result of a load that has ended. wait: waits until it has. Throws the load's Error.
     std::optional<LoadedScene> take_loaded(bool wait = false);
@@ -60,8 +67,9 @@ class Document {
     /// Returns whether the scene is that of the run that was shown, in which case it is seen from
     /// where the user looked at the run.
     bool show(std::unique_ptr<Scene> scene, const std::filesystem::path& asked, bool dropped);
-    /// Adds these splats to those of the scene and selects them. Returns how many. Throws Error.
-    std::size_t merge(SplatModel added);
+    /// Adds these splats to the scene as a layer and selects them. source: where they come from.
+    /// Returns how many. Throws Error.
+    std::size_t merge(SplatModel added, const edits::Add& source);
     /// Updates what follows from the splats after edits: bounds, subject, degree. It waits while a
     /// hand moves splats.
     void follow_edits();
@@ -99,8 +107,14 @@ class Document {
 
     void load_path();
     void save_path();
-    /// Saves the edited scene. device: for what a format computes there. Throws Error.
-    void save_scene(Device& device);
+    /// Saves the project where there is one to keep (keeps_project), else the edited scene. device:
+    /// for what a format computes there. Throws Error.
+    void save(Device& device);
+    /// Saves the visible layers together as one scene, or the layer of this name alone.
+    void save_scene(Device& device, const std::string& layer = "");
+    void save_project();
+    /// Saves the edits as a script for `darb edit`.
+    void save_script();
     /// Saves the scene as a web page that opens at the window's view. Throws Error.
     void save_page(Device& device, int width, int height);
     /// The scenes that were opened, latest first.
@@ -110,6 +124,8 @@ class Document {
     void find_own_cameras(const std::filesystem::path& scene, std::vector<std::string>& notes);
     void find_subject(Scene& scene) const;
     Subject shown_subject() const;
+    void begin_edits(Scene& scene, const std::filesystem::path& asked);
+    void draw_as_edited();
     void set_pivot();
     void show_as_meant(const Scene& scene, bool first);
     void show_degree(int degree);
@@ -122,7 +138,13 @@ class Document {
     SavedFiles saved_;
     RememberedUp remembered_;
     RecentFiles recent_;
-    int edit_at_load_ = 0;      // Edit::content when a load was started
+    int edit_at_load_ = 0;  // Edit::content when a load was started
+    struct ToAdd {
+        std::filesystem::path path;
+        bool dropped = false;  // as for load
+    };
+    std::deque<ToAdd> to_add_;
+    int drawn_model_ = 0;       // Edit::model_version for which Scene::drawn was made
     int measured_model_ = 0;    // Edit::model_version for which bounds and subject were measured
     glm::dvec3 known_up_{0.0};  // the scene's up as it was opened or last remembered
     LivePicture* live_ = nullptr;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <glm/glm.hpp>
 #include <optional>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -119,8 +120,13 @@ struct Open {
     bool merges = false;  // adds it to the current scene
 };
 struct ShowEdits {};  // other splats are deleted, selected or moved now
-struct Save {};       // saves the edited scene
-struct SavePage {};   // saves it as a web page
+struct Save {};       // saves the project where there is one to keep, else the edited scene
+struct SaveScene {
+    std::string layer;
+};  // saves the visible layers together as one scene, or a layer alone
+struct SaveProject {};
+struct SaveScript {};  // saves the edits as a script
+struct SavePage {};    // saves it as a web page
 struct LoadPath {};
 struct SavePath {};
 struct ExportPath {};
@@ -156,8 +162,9 @@ struct LeaveFullScreen {};
 using Request =
     std::variant<request::FrameAll, request::Frame, request::TakePicture, request::ChooseCamera,
                  request::LeavePhoto, request::FollowPlan, request::Measure, request::ShowOpen,
-                 request::Open, request::ShowEdits, request::Save, request::SavePage,
-                 request::LoadPath, request::SavePath, request::ExportPath, request::CancelLoad,
+                 request::Open, request::ShowEdits, request::Save, request::SaveScene,
+                 request::SaveProject, request::SaveScript, request::SavePage, request::LoadPath,
+                 request::SavePath, request::ExportPath, request::CancelLoad,
                  request::FindFreeSpace, request::CancelWork, request::PickPoint, request::OpenMesh,
                  request::MakeMesh, request::SaveMesh, request::CloseMesh, request::AskRun,
                  request::Quit, request::SaveAndLeave, request::Leave, request::Stay,

@@ -138,15 +138,6 @@ Camera Navigation::camera(int width_px, int height_px) const {
     return c;
 }
 
-glm::dmat3 turn_to_up(const glm::dvec3& up) {
-    const glm::dvec3 to(0, -1, 0);
-    glm::dvec3 axis = glm::cross(up, to);
-    const double sine = glm::length(axis);
-    // a half turn where the directions are opposite
-    axis = sine > 1e-12 ? axis / sine : glm::dvec3(1, 0, 0);
-    return rotation_about(axis, std::atan2(sine, glm::dot(up, to)));
-}
-
 std::string up_name(const glm::dvec3& up) {
     int best = 0;
     for (int i = 1; i < 3; ++i)

@@ -62,8 +62,6 @@ struct Navigation {
     void turn(double to_right, double to_down);
 };
 
-/// The shortest turn of the world that takes `up`, a unit vector, to -y.
-glm::dmat3 turn_to_up(const glm::dvec3& up);
 /// The name of the axis nearest to a direction.
 std::string up_name(const glm::dvec3& up);
 

@@ -59,7 +59,7 @@ Painter::~Painter() {
 }
 
 void Painter::open(const Scene& scene) {
-    picture_.set_scene(scene.model, scene.bounds, scene.important);
+    picture_.set_scene(scene.shown(), scene.bounds, scene.important);
     work_.cancel_mesh();  // it was of another scene
     if (session_->mesh) close_mesh();
     under_way_.clear();
@@ -131,7 +131,7 @@ void Painter::begin_scene(bool of_run) {
     constexpr int kSize = 256;  // px
     if (of_run && options_.second_device && live_.size.x > 0)
         warm_up_.thread = std::make_unique<WarmUp>(
-            *device_, *options_.second_device, session_->scene->model, shown_displays(),
+            *device_, *options_.second_device, session_->scene->shown(), shown_displays(),
             session_->navigation.camera(kSize, kSize), options_.wake);
     else
         live_.size = {0, 0};
@@ -162,7 +162,7 @@ void Painter::show_edits() {
         if (edit.transforms()) {
             picture_.update_scene();
         } else {
-            picture_.set_scene(scene.model, scene.bounds, scene.important);
+            picture_.set_scene(scene.shown(), scene.bounds, scene.important);
             begin_motion();
         }
         shown_model_ = edit.model_version();
@@ -266,7 +266,7 @@ void Painter::start_levels() {
     for (const double share : shares_)
         counts.push_back(static_cast<std::size_t>(share * static_cast<double>(s.model.size())));
     levels_ =
-        std::make_unique<MotionLevels>(s.model, session_->edit.unseen(), counts, options_.wake);
+        std::make_unique<MotionLevels>(s.shown(), session_->edit.unseen(), counts, options_.wake);
 }
 
 void Painter::take_levels() {
@@ -556,7 +556,7 @@ void Painter::start_search(int least_views) {
     for (const View& view : session_->photos.views) cameras.push_back(view.camera);
     FreeSpaceOptions options;
     options.least_views = static_cast<std::uint32_t>(least_views);
-    work_.start_search(*device_, session_->scene->model, cameras, options);
+    work_.start_search(*device_, session_->scene->shown(), cameras, options);
 }
 
 void Painter::step_search() {

@@ -194,6 +194,10 @@ std::string recover_unsaved(const Session& s) {
                     [&](const fs::path& file) {
                         save_splats(file, SplatFormat::ply, s.edit.apply(s.scene->model));
                     });
+    if (s.scene && s.edit.unsaved() && keeps_project(s))
+        said +=
+            ". " + keep("The project", s.project.to_save, scene_name(s.scene->file), ".darb.json",
+                        [&](const fs::path& file) { write_project(file, project_of_session(s)); });
     if (unsaved_mesh(s))
         said += (said.empty() ? "" : ". ") +
                 keep("The mesh", s.mesh_file, s.mesh_file.stem().string(), ".glb",
@@ -220,7 +224,8 @@ std::vector<FolderEntry> list_folder(const std::filesystem::path& folder) {
         const std::string name = at->path().filename().string();
         const bool is_folder = at->is_directory(none);
         const bool is_scene = at->is_regular_file(none) &&
-                              (names_scene(at->path()) || has_extension(at->path(), ".obj"));
+                              (names_scene(at->path()) || has_extension(at->path(), ".obj") ||
+                               is_project_file(at->path()));
         if (!name.starts_with('.') && (is_folder || is_scene)) entries.push_back({name, is_folder});
     }
     std::sort(entries.begin(), entries.end(), [](const FolderEntry& a, const FolderEntry& b) {

@@ -132,10 +132,50 @@ Scene finished_scene(Scene scene, const SplatFile& facts, const LoadProgress& pr
     return scene;
 }
 
+// Each scene of the project takes its share of the progress.
+Scene load_project_scene(const std::filesystem::path& file, const LoadProgress& progress,
+                         const StoredUnits& units) {
+    const LoadClock::time_point start = LoadClock::now();
+    Scene scene;
+    scene.file = file;
+    scene.format = "project";
+    scene.project = std::make_unique<OpenedProject>();
+    Project& project = scene.project->project;
+    project = read_project(file);
+    scene.notes = changed_files(project, file.string());
+    const double count = static_cast<double>(files_of_project(project).size());
+    double read = 0;
+    const ReadScene read_scene = [&](const std::filesystem::path& part) {
+        if (is_project_file(part))
+            throw Error(part.string(), "is a project, and a project cannot be a layer of another",
+                        "Save its layers together as one file, and name that.");
+        const auto share = [&](double done, const char* stage) {
+            if (progress) progress((read + done) / (count + 1), stage);
+        };
+        Scene loaded = load_scene_file(part, share, units);
+        if (read == 0) scene.up = loaded.up;
+        scene.notes.insert(scene.notes.end(), loaded.notes.begin(), loaded.notes.end());
+        ++read;
+        return std::move(loaded.model);
+    };
+    EditedScene edited = perform_project(project, file.string(), read_scene);
+    scene.model = std::move(edited.model);
+    scene.project->edit = std::move(edited.edit);
+    scene.drawn = scene.project->edit.drawn_otherwise(scene.model);
+    if (progress) progress(0.95, "measuring");
+    measure_scene(scene);
+    scene.load_s = std::chrono::duration<double>(LoadClock::now() - start).count();
+    return scene;
+}
+
 }  // namespace
 
 Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& progress,
                       const StoredUnits& units) {
+    if (is_project_file(file)) {
+        check_scene_file(file);
+        return load_project_scene(file, progress, units);
+    }
     const LoadClock::time_point start = LoadClock::now();
     Scene scene;
     scene.file = file;

@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "engine/scene/project_file.h"
 #include "engine/scene/splat_model.h"
 #include "engine/scene/stored_units.h"
 #include "viewer/bounds.h"
@@ -21,18 +22,29 @@
 
 namespace darb {
 
+/// A project as it was read, with its edits performed on the scene's model.
+struct OpenedProject {
+    Project project;
+    Edit edit;
+};
+
 struct Scene {
     std::filesystem::path file;
     SplatModel model;
-    Bounds bounds;           // around nearly all splats
-    Subject subject;         // what the cameras look at
-    std::string format;      // a name from format_name
+    std::optional<SplatModel> drawn;  // where it is not the model itself: Edit::drawn_otherwise
+    std::unique_ptr<OpenedProject> project;  // where the file is one
+    Bounds bounds;                           // around nearly all splats
+    Subject subject;                         // what the cameras look at
+    std::string format;                      // a name from format_name
     bool is_points = false;  // whether it is a point cloud, without splat parameters in the file
     std::optional<ShownMesh> mesh;         // where the file holds one; its vertices are the points
     std::vector<std::uint32_t> important;  // what is drawn in motion, most important first
     std::string up;                        // a value of --up where the file says it; else empty
     double load_s = 0;
     std::vector<std::string> notes;  // what was dropped or cannot be shown, a sentence each
+
+    /// What pictures show.
+    const SplatModel& shown() const { return drawn ? *drawn : model; }
 };
 
 /// Measures the bounds, the most important splats, and the subject as if there were no cameras.
@@ -43,7 +55,7 @@ void measure_scene(Scene& scene);
 void check_scene_file(const std::filesystem::path& file);
 
 /// Reads a file that load_splats knows, or a PLY point cloud or a mesh, whose points become small
-/// opaque splats.
+/// opaque splats. A project brings all its layers.
 /// `progress` is called with a share of 0 to 1 and what is being done; it throws to cancel. Throws
 /// an Error that names the file.
 using LoadProgress = std::function<void(double share, const char* stage)>;

@@ -14,12 +14,13 @@
 
 #include "engine/gpu/commands.h"
 #include "engine/plan/effect_plan.h"
+#include "engine/scene/edit.h"
 #include "engine/scene/region.h"
 #include "viewer/camera_path.h"
 #include "viewer/display.h"
-#include "viewer/edit.h"
 #include "viewer/guides.h"
 #include "viewer/input.h"
+#include "viewer/layers.h"
 #include "viewer/mesh_work.h"
 #include "viewer/navigation.h"
 #include "viewer/panes.h"
@@ -112,6 +113,35 @@ struct Selection {
     bool shown = false;
 };
 
+/// The project that is open or would be saved.
+struct ProjectState {
+    std::filesystem::path file;        // as it was opened or saved; empty: none yet
+    std::filesystem::path to_save;     // where it is saved next
+    std::filesystem::path first_file;  // of the scene that was opened first, with its first name
+    std::string first_name;
+    std::filesystem::path cameras;  // that the project names; empty: none
+};
+
+/// The list of layers in the panel.
+struct OutlinerState {
+    int active = 0;                  // the layer whose numbers are shown
+    bool editing = false;            // whether a number is being typed
+    LayerPose pose;                  // while it is
+    std::string renaming;            // the name that is being typed; empty: none
+    bool shown = false;              // whether the list was drawn in the last frame
+    glm::dvec2 low{0.0}, high{0.0};  // its corners, px of the window
+    /// Whether a file dropped there is added.
+    bool has(double x, double y) const {
+        return shown && x >= low.x && x <= high.x && y >= low.y && y <= high.y;
+    }
+};
+
+/// The note whose words are being typed.
+struct NoteDraft {
+    SceneNote note;
+    int replaces = -1;  // the note that it changes; -1: a new one
+};
+
 /// A request to quit or to open another scene, asked for while edits are not saved.
 struct Leaving {
     bool quit = false;
@@ -123,6 +153,7 @@ struct ShownState {
     std::unique_ptr<Scene> scene;  // null: none yet, or a training run is shown
     Edit edit;
     Selection selection;
+    ProjectState project;
     std::filesystem::path save_file;
     std::unique_ptr<ShownMesh> mesh;  // null: none
     MeshWish mesh_wish;
@@ -175,6 +206,8 @@ struct AskedState {
     std::vector<WindowRequest> for_window;  // from the last frame
     ToolState tools;
     OpenDialog open_dialog;
+    OutlinerState outliner;
+    NoteDraft note_draft;
     std::optional<Leaving> leaving;  // waits for an answer
     WorkProgress progress;
     std::string error;         // shown until it is dismissed

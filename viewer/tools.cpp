@@ -128,25 +128,24 @@ bool has_gizmo(Tool tool) {
     return tool == Tool::move || tool == Tool::turn || tool == Tool::scale;
 }
 
-SplatSet stroke_mask(const Session& s, const Camera& camera) {
-    const SplatModel& m = s.scene->model;
+Selector stroke_selector(const Session& s, const Camera& camera) {
     const ToolState& t = s.tools;
     switch (t.tool) {
         case Tool::rectangle:
-            return in_rectangle(m, camera, t.stroke.front(), t.stroke.back());
+            return by::Rectangle{camera, t.stroke.front(), t.stroke.back()};
         case Tool::lasso:
-            return in_lasso(m, camera, t.stroke);
+            return by::Polygon{camera, t.stroke};
         case Tool::brush:
-            return under_brush(m, camera, t.stroke, double{t.brush_px} * s.gui_scale);
+            return by::Brush{camera, t.stroke, double{t.brush_px} * s.gui_scale};
         case Tool::sphere:
             if (t.sphere)
-                return in_region(
-                    m, {Region::Shape::sphere, *t.sphere, glm::dvec3(drawn_radius(s, camera))});
+                return Region{Region::Shape::sphere, *t.sphere,
+                              glm::dvec3(drawn_radius(s, camera))};
             break;
         default:
             break;
     }
-    return SplatSet(m.size(), 0);
+    return by::Nothing{};
 }
 
 void begin_stroke(const Input& in, const Camera& camera, Session& s) {
@@ -162,11 +161,11 @@ void begin_stroke(const Input& in, const Camera& camera, Session& s) {
 
 void end_stroke(const Camera& camera, Session& s) {
     ToolState& t = s.tools;
-    const SplatSet mask = stroke_mask(s, camera);
+    const edits::Select select{stroke_selector(s, camera), t.combine};
     t.drawing = false;
     t.stroke.clear();
     t.sphere.reset();
-    show_edit(s.edit.select(mask, t.combine), s);
+    show_edit(s.edit.perform(select, s.scene->model), s);
 }
 
 // The centre is the middle of the selection, else of everything.

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "engine/scene/camera.h"
+#include "engine/scene/edit.h"
 #include "engine/scene/edit_splats.h"
-#include "viewer/edit.h"
 
 namespace darb {
 

@@ -30,13 +30,6 @@ Camera fitted(const Camera& camera, const WindowArea& area) {
     return c;
 }
 
-double distance_to_segment(const glm::dvec2& p, const glm::dvec2& a, const glm::dvec2& b) {
-    const glm::dvec2 along = b - a;
-    const double square = glm::dot(along, along);
-    const double t = square > 0 ? std::clamp(glm::dot(p - a, along) / square, 0.0, 1.0) : 0;
-    return glm::distance(p, a + t * along);
-}
-
 Camera at_scale(const Camera& camera, double scale) {
     const auto px = [&](int full) {
         return std::max(1, static_cast<int>(std::lround(full * scale)));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/scene/camera.h"
+#include "engine/scene/select.h"
 #include "engine/scene/splat_model.h"
 #include "viewer/photo_compare.h"
 
@@ -18,13 +19,6 @@ double fit_scale(const Camera& camera, int width, int height);
 /// beyond the frame is shown too.
 Camera fitted(const Camera& camera, const WindowArea& area);
 
-/// The pixel at which the point is seen; nothing behind the camera.
-inline std::optional<glm::dvec2> pixel_of(const Camera& c, const glm::dvec3& world) {
-    const glm::dvec3 p = c.rotation * world + c.translation;
-    if (!(p.z > 0)) return {};
-    return glm::dvec2(c.fx * p.x / p.z + c.cx, c.fy * p.y / p.z + c.cy);
-}
-double distance_to_segment(const glm::dvec2& p, const glm::dvec2& a, const glm::dvec2& b);
 /// The same view in another size, scaled by this share in width and height.
 Camera at_scale(const Camera& camera, double scale);
 

@@ -77,8 +77,7 @@ void Viewer::finish_loading() {
         if (!session_.error.empty()) throw Error("darb view", session_.error);
         return;
     }
-    if (std::optional<LoadedScene> loaded = document_.take_loaded(true))
-        controller_.show(std::move(*loaded));
+    controller_.finish_loading();
     painter_.finish_mesh();
 }
 

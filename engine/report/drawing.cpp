@@ -133,7 +133,8 @@ struct Look {
 };
 
 Look look_of(const std::string& style, int series) {
-    const std::string ink = css_colour(palette::kLight.ink), soft = css_colour(palette::kLight.soft),
+    const std::string ink = css_colour(palette::kLight.ink),
+                      soft = css_colour(palette::kLight.soft),
                       line = css_colour(palette::kLight.line);
     const auto& colours = palette::kLight.series;
     const std::string colour =

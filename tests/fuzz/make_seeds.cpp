@@ -20,7 +20,9 @@
 #include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/mesh/mesh_file.h"
+#include "engine/scene/edit_script.h"
 #include "engine/scene/inflate.h"
+#include "engine/scene/project_file.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/spz.h"
 #include "tests/support/ksplat_file.h"
@@ -272,6 +274,36 @@ void make_colmap(const fs::path& corpus) {
     add("points_text", 5, bytes_of(cloud));
 }
 
+void make_projects(const fs::path& corpus) {
+    const Camera view = random_scene().camera;
+    const std::vector<EditOperation> edits{
+        edits::Select{Region{Region::Shape::sphere, {0, 0, 0}, glm::dvec3(2)}},
+        edits::Select{by::Polygon{view, {{1, 1}, {9, 1}, {5, 8}}}, Combine::add},
+        edits::Transform{{2, turn_of_degrees({1, 2, 3}), {1, 0, 0}}, ""},
+        edits::Add{"other.ply", "other"},
+        edits::Duplicate{"other", "twin"},
+        edits::MergeLayers{"other", "twin"},
+        edits::ShowLayer{"other", false},
+        edits::Remove{by::Numbers{{{0, 1}}}, false},
+        edits::StateUnit{0.5}};
+    const std::string script = format_edit_script(edits, "");
+    DARB_CHECK(parse_edit_script(script, "seed", "").size() == edits.size());
+    write_file_atomic(corpus / "project/script", script);
+    Project project;
+    project.layers = {{"first", "first.ply", true, {}},
+                      {"second", "second.ply", false, {2, glm::dmat3(1.0), {1, 2, 3}}}};
+    project.edits = edits;
+    project.files = {{"first.ply", 12, "fnv1a64:0"}};
+    project.measured = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, true};
+    const NoteCamera camera{{0, 0, 3}, {1, 0, 0, 0}, 0.8};
+    project.notes = {{{1, 2, 3}, "title", "text", camera}};
+    project.path = {{0, camera}, {1, camera}};
+    project.view = ProjectView{camera, 3, {0, -1, 0}, {0, 0, 0}};
+    const std::string text = format_project(project, "");
+    DARB_CHECK(parse_project(text, "seed", "").notes.size() == 1);
+    write_file_atomic(corpus / "project/project", text);
+}
+
 void make_transforms(const fs::path& corpus) {
     const std::string head = "{\"w\": 80, \"h\": 60, \"fl_x\": 50, \"k1\": 0.1, \"k4\": 0.01, ",
                       frame =
@@ -344,6 +376,7 @@ int main(int argc, char** argv) {
     try {
         darb::test::make_scenes(corpus);
         darb::test::make_colmap(corpus);
+        darb::test::make_projects(corpus);
         darb::test::make_transforms(corpus);
         darb::test::make_meshes(corpus);
         darb::test::make_photos(corpus);

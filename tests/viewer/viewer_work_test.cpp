@@ -309,8 +309,15 @@ TEST_F(ViewerWork, A_scene_is_merged_and_goes_again) {
     s.ask(request::Open{folder_ / "other.ply", true});
     frame();
     finish_load();
-    EXPECT_NE(s.error.find("raised_cosine"), std::string::npos) << s.error;
-    EXPECT_EQ(s.scene->model.size(), count);
+    frame();
+    EXPECT_EQ(s.error, "");
+    EXPECT_NE(s.note.find("raised_cosine is drawn"), std::string::npos) << s.note;
+    EXPECT_EQ(s.scene->model.size(), 2 * count);
+    EXPECT_EQ(s.display.kernel, KERNEL_GAUSSIAN);
+    s.edit.perform(edits::ShowLayer{"scene", false}, s.scene->model);
+    s.ask(request::ShowEdits{});
+    frame();
+    EXPECT_EQ(s.display.kernel, KERNEL_RAISED_COSINE) << "alone it is drawn as it is";
 }
 
 TEST_F(ViewerWork, What_was_merged_is_framed_and_frame_all_shows_both) {

@@ -27,6 +27,7 @@ void add_train(CLI::App& app, Action& action, const std::vector<std::string>& ar
     ROW(render, "Scenes")   \
     DARB_VIEW_COMMAND(ROW)  \
     ROW(convert, "Scenes")  \
+    ROW(edit, "Scenes")     \
     ROW(mesh, "Scenes")     \
     ROW(clean, "Scenes")    \
     ROW(info, "Insight")    \

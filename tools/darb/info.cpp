@@ -21,6 +21,7 @@
 #include "engine/data/dataset.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/project_file.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/stored_units.h"
 #include "shaders/shared/limits.h"
@@ -68,7 +69,7 @@ struct InfoFlags {
 bool is_dataset(const std::filesystem::path& path) {
     if (scene_file_in(path)) return false;
     if (std::filesystem::is_directory(path)) return !std::filesystem::exists(path / "point_cloud");
-    return has_extension(path, ".json") && !names_scene_folder(path);
+    return has_extension(path, ".json") && !names_scene_folder(path) && !is_project_file(path);
 }
 
 int info(const InfoFlags& flags) {
@@ -338,7 +339,10 @@ void add_warnings(json& info) {
 
 json scene_info(const std::filesystem::path& path, const StoredUnits& units) {
     SplatFile file;
-    const SplatModel model = load_splats(path, &file, units);
+    const bool project = is_project_file(path);
+    const SplatModel model =
+        project ? load_scene(path, &file, units) : load_splats(path, &file, units);
+    if (project) file.details = "layers of a project together";
     json info = {{"path", path.string()},
                  {"format", format_name(file.format)},
                  {"version", file.version == 0 ? json() : json(file.version)},

@@ -5,6 +5,7 @@
 
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
+#include "engine/scene/project_file.h"
 
 namespace darb {
 
@@ -16,6 +17,10 @@ std::vector<View> open_cameras(const std::filesystem::path& path, const DatasetO
 }
 
 std::vector<View> cameras_beside(const std::filesystem::path& scene) {
+    if (is_project_file(scene)) {
+        const std::filesystem::path cameras = read_project(scene).cameras;
+        return cameras.empty() ? std::vector<View>() : load_cameras(cameras);
+    }
     for (std::filesystem::path folder = std::filesystem::absolute(scene);
          folder.has_relative_path(); folder = folder.parent_path()) {
         if (std::filesystem::is_regular_file(folder / "cameras.json"))

@@ -13,7 +13,8 @@ namespace darb {
 std::vector<View> open_cameras(const std::filesystem::path& path,
                                const DatasetOptions& options = {});
 
-/// The cameras.json that darb train left beside a scene; empty where there is none. Throws Error.
+/// The cameras.json that darb train left beside a scene, or those that a project names; empty where
+/// there are none. Throws Error.
 std::vector<View> cameras_beside(const std::filesystem::path& scene);
 
 }  // namespace darb

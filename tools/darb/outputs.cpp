@@ -16,6 +16,7 @@
 #include "engine/core/say.h"
 #include "engine/core/system_files.h"
 #include "engine/core/user_folders.h"
+#include "engine/scene/project_file.h"
 #include "trainer/job/scene_file.h"
 #include "trainer/run/run_folder.h"
 
@@ -94,6 +95,9 @@ Paths files_of(const fs::path& input) {
     if (input.empty()) return {};
     Paths files{input};
     std::error_code none;
+    if (is_project_file(input) && fs::is_regular_file(input, none))
+        for (const fs::path& file : files_of_project(read_project(input)))
+            for (const fs::path& part : files_of(file)) files.push_back(part);
     const bool folder = fs::is_directory(input, none);
     const fs::path beside = folder ? input : input.parent_path();
     if (folder) {

@@ -158,9 +158,14 @@ int view(ViewFlags flags) {
     refuse_to_overwrite_inputs({flags.screenshot, flags.times},
                                together({files_of(flags.scene), files_of(flags.cameras),
                                          files_of(flags.path), files_of(flags.mesh)}));
+    for (const std::filesystem::path& more : flags.more)
+        refuse_to_overwrite_inputs({flags.screenshot, flags.times}, files_of(more));
     refuse_other_pictures(flags.screenshot);
     if (!flags.scene.empty())
         check_scene_file(find_scene(flags.scene));  // reports an error before a window opens
+    for (const std::filesystem::path& more : flags.more) check_scene_file(find_scene(more));
+    options.more = flags.more;
+    options.cameras = flags.cameras;
     if (!flags.mesh.empty()) check_mesh_file(flags.mesh);
     options.mesh = flags.mesh;
     std::string note;
@@ -264,7 +269,9 @@ void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size) 
 }
 
 void add_view_flags(CLI::App& c, ViewFlags& flags) {
-    c.add_option("scene", flags.scene, "a splat file or point cloud, or a folder of darb train");
+    c.add_option("scene", flags.scene,
+                 "a splat file or point cloud, a project (.darb.json), or a folder of darb train");
+    c.add_option("more", flags.more, "more scenes, each added as a layer");
     c.add_option("--cameras", flags.cameras,
                  "a data set, to look through its cameras and compare with its photos");
     c.add_option("--camera", flags.camera, "start at this camera of the data set, counted from 0")

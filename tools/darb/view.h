@@ -15,6 +15,7 @@ namespace darb {
 
 struct ViewFlags {
     std::filesystem::path scene, cameras, screenshot, path, frames, times, mesh;
+    std::vector<std::filesystem::path> more;  // scenes to add as layers
     std::string device, up, beside, size = "1280x720", show = "picture", style = "splats";
     std::string mesh_show = "both", mesh_look = "colours";
     int camera = -1, fps = 30;

@@ -16,6 +16,7 @@
 #include "engine/core/text.h"
 #include "engine/data/image_io.h"
 #include "engine/data/video.h"
+#include "trainer/job/edited_scene.h"
 
 namespace darb {
 
@@ -113,7 +114,7 @@ std::optional<Other> other_file(const fs::path& path) {
                      "--resume goes on from the checkpoint."};
     if (has_extension(path, ".html") || has_extension(path, ".htm"))
         return Other{"is a web page, and no scene", "Open it in a browser."};
-    if (has_extension(path, ".json") && !names_scene_folder(path))
+    if (has_extension(path, ".json") && !names_scene_folder(path) && !is_project_file(path))
         return Other{"is no scene: cameras and camera paths are .json files",
                      "Name the scene, and cameras after --cameras, a path after --path."};
     return {};
@@ -185,11 +186,17 @@ fs::path find_scene(const fs::path& path) {
 }
 
 bool is_scene(const fs::path& path) {
-    if (fs::is_regular_file(path)) return path.extension() != ".json";
+    if (fs::is_regular_file(path)) return path.extension() != ".json" || is_project_file(path);
     return fs::exists(path / "point_cloud") || scene_file_in(path);
 }
 
 SplatModel load_scene(const fs::path& path, SplatFile* facts, const StoredUnits& units) {
+    if (is_project_file(path)) {
+        const EditedScene scene = load_edited_scene(path, facts, units);
+        for (const std::string& loss : scene.edit.losses_together())
+            say("warning: {}: {}\n", path.string(), loss);
+        return scene.saved();
+    }
     const fs::path file = find_scene(path);
     SplatFile unused;
     SplatFile& said = facts ? *facts : unused;
@@ -199,6 +206,25 @@ SplatModel load_scene(const fs::path& path, SplatFile* facts, const StoredUnits&
             said.dropped);
     for (const std::string& note : said.notes) say("warning: {}: {}\n", file.string(), note);
     return model;
+}
+
+EditedScene load_edited_scene(const fs::path& path, SplatFile* facts, const StoredUnits& units) {
+    if (is_project_file(path)) {
+        const Project project = read_project(path);
+        for (const std::string& note : changed_files(project, path.string()))
+            say("warning: {}: {}\n", path.string(), note);
+        return perform_project(project, path.string(), [&](const fs::path& file) {
+            if (is_project_file(file))
+                throw Error(file.string(),
+                            "is a project, and a project cannot be a layer of another",
+                            "Save its layers together as one file, and name that.");
+            return load_scene(file, facts, units);
+        });
+    }
+    EditedScene scene;
+    scene.model = load_scene(path, facts, units);
+    scene.edit = Edit(scene.model, scene_name(path), find_scene(path));
+    return scene;
 }
 
 }  // namespace darb

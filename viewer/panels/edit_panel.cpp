@@ -73,19 +73,17 @@ void tool_settings(Session& s) {
     tip("Radius of the brush on the screen");
 }
 
-void select(const SplatSet& mask, Session& s) {
+void select(const Selector& what, Session& s) {
     const ImGuiIO& io = ImGui::GetIO();
-    show_edit(s.edit.select(mask, io.KeyShift  ? Combine::add
-                                  : io.KeyCtrl ? Combine::subtract
-                                               : Combine::replace),
-              s);
+    perform_edit(edits::Select{what, io.KeyShift  ? Combine::add
+                                     : io.KeyCtrl ? Combine::subtract
+                                                  : Combine::replace},
+                 s);
 }
 
 void grow_button(Session& s) {
     if (ImGui::Button("Grow"))
-        show_edit(s.edit.select(grown(s.scene->model, s.edit.selected(), double{s.tools.grow}),
-                                Combine::add),
-                  s);
+        perform_edit(edits::Select{by::Near{double{s.tools.grow}}, Combine::add}, s);
     tip("Add all splats that are nearer to a selected one than the distance on the right");
     ImGui::SameLine();
     ImGui::SetNextItemWidth(110 * s.gui_scale);
@@ -169,7 +167,7 @@ void select_by_value(Session& s) {
     tip("Lowest and highest opacity, 0 to 1");
     ImGui::SameLine();
     if (ImGui::Button("opacity"))
-        select(by_opacity(m, double{t.opacity[0]}, double{t.opacity[1]}), s);
+        select(by::Opacity{double{t.opacity[0]}, double{t.opacity[1]}}, s);
     tip("Select the splats in this range; Shift adds, Ctrl takes away");
     const auto place = [&](float size) {
         return h.most > h.least && size > 0
@@ -183,7 +181,7 @@ void select_by_value(Session& s) {
                            "%.3g", kClamped);
     tip("Smallest and largest size: the largest standard deviation, in units of the scene");
     ImGui::SameLine();
-    if (ImGui::Button("size")) select(by_scale(m, double{t.scale[0]}, double{t.scale[1]}), s);
+    if (ImGui::Button("size")) select(by::Size{double{t.scale[0]}, double{t.scale[1]}}, s);
     tip("Select the splats in this range; Shift adds, Ctrl takes away");
     ImGui::ColorEdit3("##colour", &t.colour.x, ImGuiColorEditFlags_NoInputs);
     tip("The colour to look for, sRGB");
@@ -192,7 +190,7 @@ void select_by_value(Session& s) {
     ImGui::SliderFloat("##tolerance", &t.tolerance, 0, 1, "within %.2f", kClamped);
     tip("How far each channel may be from it, 0 to 1");
     ImGui::SameLine();
-    if (ImGui::Button("colour")) select(by_colour(m, glm::dvec3(t.colour), double{t.tolerance}), s);
+    if (ImGui::Button("colour")) select(by::Colour{glm::dvec3(t.colour), double{t.tolerance}}, s);
     tip("Select by the colour without harmonics; Shift adds, Ctrl takes away");
     ImGui::TreePop();
 }
@@ -201,14 +199,13 @@ void select_by_value(Session& s) {
 void clean_up(Session& s) {
     if (!ImGui::TreeNode("Clean up")) return;
     ToolState& t = s.tools;
-    const SplatModel& m = s.scene->model;
     const float width = 130 * s.gui_scale;
     ImGui::TextDisabled("Each selects; look, then press Delete.");
     ImGui::SetNextItemWidth(width);
     ImGui::SliderFloat("##isolated", &t.isolated, 0.0001f, 0.5f, "below %.4f", kLogarithmic);
     tip("Share of the heaviest part, by opacity times area");
     ImGui::SameLine();
-    if (ImGui::Button("isolated parts")) select(isolated_splats(m, double{t.isolated}), s);
+    if (ImGui::Button("isolated parts")) select(by::Isolated{double{t.isolated}}, s);
     tip("Parts that touch nothing else and are light; Shift adds, Ctrl takes away");
     ImGui::SetNextItemWidth(width / 2 - 2);
     ImGui::SliderFloat("##faint", &t.haze_opacity, 0.01f, 0.5f, "%.2f", kClamped);
@@ -218,8 +215,7 @@ void clean_up(Session& s) {
     ImGui::SliderFloat("##large", &t.haze_size, 1, 50, "%.1f x", kLogarithmic);
     tip("Least size of haze, in times of the median size");
     ImGui::SameLine();
-    if (ImGui::Button("haze"))
-        select(hazy_splats(m, double{t.haze_opacity}, double{t.haze_size}), s);
+    if (ImGui::Button("haze")) select(by::Haze{double{t.haze_opacity}, double{t.haze_size}}, s);
     tip("Splats that are large and faint; Shift adds, Ctrl takes away");
     ImGui::SetNextItemWidth(width);
     ImGui::SliderInt("##views", &t.looked_through, 1, 20, "%d photos", kClamped);
@@ -254,7 +250,7 @@ void select_by_region(Session& s) {
     }
     tip("The pivot is the point that the camera turns around");
     if (moved) s.selection.shown = true;
-    if (ImGui::Button("Select")) select(in_region(s.scene->model, s.selection.region), s);
+    if (ImGui::Button("Select")) select(s.selection.region, s);
     tip("Select the splats whose centre is inside; Shift adds, Ctrl takes away");
     ImGui::SameLine();
     if (ImGui::Button("Crop to it"))
@@ -295,6 +291,11 @@ void edit_panel(Session& s) {
     clean_up(s);
     select_by_value(s);
     select_by_region(s);
+    if (ImGui::Button("Copy")) perform_edit(edits::Duplicate{}, s);
+    tip("Add a copy of the selection as a layer");
+    ImGui::SameLine();
+    if (ImGui::Button("Parts")) perform_edit(edits::Select{by::Connected{}, Combine::add}, s);
+    tip("Select whole parts: everything that touches the selection, or touches what does");
 }
 
 void save_panel(Session& s) {
@@ -302,13 +303,17 @@ void save_panel(Session& s) {
     ImGui::SetNextItemWidth(-FLT_MIN);
     path_field("##save", s.save_file);
     tip("The ending of the name decides the format");
-    command_button(Key::save, s);
+    if (ImGui::Button("Save")) s.ask(request::SaveScene{});
+    tip("Save the visible layers together as one file; Ctrl+S does the same where there is one "
+        "layer and no project");
     ImGui::SameLine();
     ImGui::SetNextItemWidth(130 * s.gui_scale);
     format_choice(s);
     ImGui::Checkbox("save upright", &s.save_upright);
     tip("Turn the saved scene so that up is -y, as most programs expect");
     command_button(Key::save_page, s);
+    if (ImGui::Button("Save edits as script")) s.ask(request::SaveScript{});
+    tip("Write all edits beside the file, for darb edit to repeat them");
     command_button(Key::merge, s);
 }
 

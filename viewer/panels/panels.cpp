@@ -77,8 +77,13 @@ void leaving_window(Session& s, float width, float height) {
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
     if (unsaved_edits(s)) {
         ImGui::TextUnformatted("The edits of this scene have not been saved.");
-        path_field("file", s.save_file);
-        tip("The ending of the name decides the format");
+        if (keeps_project(s)) {
+            path_field("project", s.project.to_save);
+            tip("Keeps the layers with all edits");
+        } else {
+            path_field("file", s.save_file);
+            tip("The ending of the name decides the format");
+        }
     }
     if (unsaved_mesh(s)) {
         ImGui::TextUnformatted("The mesh that was made has not been saved.");
@@ -107,6 +112,16 @@ struct TabRow {
 constexpr auto kAlways = [](const Session&) { return true; };
 constexpr auto kWithScene = [](const Session& s) { return s.scene != nullptr; };
 
+void scene_tab(Session& s) {
+    scene_panel(s);
+    layers_panel(s);
+}
+
+void measure_tab(Session& s) {
+    measure_panel(s);
+    notes_panel(s);
+}
+
 void view_tab(Session& s) {
     display_panel(s);
     ImGui::Spacing();
@@ -119,13 +134,12 @@ void view_tab(Session& s) {
 
 constexpr TabRow kTabs[] = {
     {Tab::training, "Training", training_panel, [](const Session& s) { return s.training.live; }},
-    {Tab::scene, "Scene", scene_panel,
-     [](const Session& s) { return !s.training.live || s.scene; }},
+    {Tab::scene, "Scene", scene_tab, [](const Session& s) { return !s.training.live || s.scene; }},
     {Tab::view, "View", view_tab, kAlways},
     {Tab::camera, "Camera", camera_panel, kAlways},
     {Tab::splats, "Splats", edit_panel, kWithScene},
     {Tab::mesh, "Mesh", mesh_panel, kWithScene},
-    {Tab::measure, "Measure", measure_panel, kWithScene},
+    {Tab::measure, "Measure", measure_tab, kWithScene},
     {Tab::film, "Film", path_panel, kAlways},
 };
 

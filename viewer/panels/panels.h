@@ -24,6 +24,11 @@ void save_panel(Session& session);  // in the tab of the scene
 void display_panel(Session& session);
 void camera_panel(Session& session);
 void edit_panel(Session& session);
+/// The list of layers.
+void layers_panel(Session& session);
+void notes_panel(Session& session);
+/// Labels of notes over the picture.
+void draw_notes(const Session& session, int width, int height);
 void mesh_panel(Session& session);
 void measure_panel(Session& session);
 void path_panel(Session& session);

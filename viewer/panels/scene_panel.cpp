@@ -38,7 +38,7 @@ void kernel_choice(Session& s) {
     tip("How a splat is projected: psi, a fitted Gaussian-like curve, or the exact line integral "
         "where the kernel has one");
     if (!s.scene) return;
-    const SplatModel& m = s.scene->model;
+    const SplatModel& m = s.scene->shown();
     if (m.kernel == d.kernel && m.footprint == d.footprint) return;
     ImGui::TextWrapped("The scene was trained with %s, %s.",
                        std::string(kernel_name(m.kernel)).c_str(),

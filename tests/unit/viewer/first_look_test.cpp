@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
+#include "engine/scene/splat_moves.h"
 #include "tests/support/splat_files.h"
 #include "tests/support/test_data.h"
 #include "viewer/bounds.h"

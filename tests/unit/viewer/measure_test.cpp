@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Lengths, heights and areas between points; the scale and the ground that they give; undo.
-#include "viewer/measure.h"
+#include "engine/scene/measure.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which splats a stroke or a range of values has; the gizmo's handles.
-#include "viewer/edit.h"
+#include "engine/scene/edit.h"
 
 #include <gtest/gtest.h>
 

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <glm/glm.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,12 +19,29 @@ struct Measurement {
     bool operator==(const Measurement&) const = default;
 };
 
+/// A view of a scene: where its eye is, how it is turned and how wide it sees.
+struct NoteCamera {
+    glm::dvec3 eye{0.0};                 // world
+    glm::dquat orientation{1, 0, 0, 0};  // camera to world
+    double fov_y = 0;                    // rad
+    bool operator==(const NoteCamera&) const = default;
+};
+
+/// A remark at a place of the scene, shown as a label.
+struct SceneNote {
+    glm::dvec3 at{0.0};  // world
+    std::string title, text;
+    std::optional<NoteCamera> camera;  // from where it is meant to be looked at
+    bool operator==(const SceneNote&) const = default;
+};
+
 /// What is known of a scene besides its splats.
 struct SceneFacts {
     double metres_per_unit = 0;    // 0: not known
     std::optional<glm::dvec3> up;  // unit vector; nothing: as the scene was opened
     bool ground = false;           // `up` is that of a ground that was picked
     Measurement measured;
+    std::vector<SceneNote> notes;
     bool operator==(const SceneFacts&) const = default;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "viewer/measure.h"
+#include "engine/scene/measure.h"
 
 #include <fmt/format.h>
 
