@@ -120,8 +120,8 @@ TEST(CompareCommand, AddedSplatsAndMergedReports_slow) {
             << value;
     const std::string tex = read_text_file(paper / "quality-scene-4.tex");
     EXPECT_NE(tex.find("other\\_one (not trained here)"), std::string::npos) << tex;
-    for (const char* name : {"quality-scene-4.csv", "scene-loss-iterations.pdf",
-                             "scene-loss-iterations.svg", "report.tex"})
+    for (const char* name : {"quality-scene-4.csv", "scene-held-out-psnr-training-time-s.pdf",
+                             "scene-held-out-psnr-training-time-s.svg", "report.tex"})
         EXPECT_TRUE(fs::exists(paper / name)) << name;
     EXPECT_NE(read_text_file(out / "compare.html").find("held-out pictures"), std::string::npos);
 
