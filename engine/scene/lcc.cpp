@@ -87,10 +87,10 @@ std::size_t lcc_number(const LccJson& object, const char* key) {
     return value.get<std::size_t>();
 }
 
-/// The range of this name, else of the other; throws where neither is there.
+/// The range of the other name, else of this one; throws where neither is there.
 LccRange lcc_range(const LccJson& attributes, const char* name, const char* other) {
     const LccJson* found = nullptr;
-    for (const char* wanted : {other, name})
+    for (const char* wanted : {name, other})
         for (const LccJson& one : attributes)
             if (one.at("name").get<std::string>() == wanted) found = &one;
     if (!found)
