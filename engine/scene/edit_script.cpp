@@ -129,7 +129,13 @@ std::vector<SplatRun> ranges_in(JsonFields& fields) {
 json json_of_region(const Region& r) {
     if (r.shape == Region::Shape::sphere)
         return {{"by", "sphere"}, {"centre", json_of(r.centre)}, {"radius", r.half_size.x}};
-    return {{"by", "box"}, {"centre", json_of(r.centre)}, {"half_size", json_of(r.half_size)}};
+    if (r.shape == Region::Shape::box)
+        return {{"by", "box"}, {"centre", json_of(r.centre)}, {"half_size", json_of(r.half_size)}};
+    const Prism& p = r.prism;
+    return {{"by", "prism"},       {"at", json_of(p.at)},
+            {"u", json_of(p.u)},   {"v", json_of(p.v)},
+            {"up", json_of(p.up)}, {"corners", json_of_line(p.corners)},
+            {"low", p.low},        {"high", p.high}};
 }
 
 json json_of_selector(const Selector& what) {
@@ -206,6 +212,19 @@ const SelectorRow kSelectors[] = {
     {"box",
      [](JsonFields& f) -> Selector {
          return Region{Region::Shape::box, f.vector("centre"), f.vector("half_size")};
+     }},
+    {"prism",
+     [](JsonFields& f) -> Selector {
+         Region region;
+         region.shape = Region::Shape::prism;
+         region.prism = {f.vector("at"),
+                         f.vector("u"),
+                         f.vector("v"),
+                         f.vector("up"),
+                         line_in(f, "corners", 3),
+                         f.number("low", -kMost, kMost),
+                         f.number("high", -kMost, kMost)};
+         return region;
      }},
     {"rectangle",
      [](JsonFields& f) -> Selector {

@@ -13,6 +13,7 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/clutter.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/region.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
