@@ -132,10 +132,9 @@ json json_of_region(const Region& r) {
     if (r.shape == Region::Shape::box)
         return {{"by", "box"}, {"centre", json_of(r.centre)}, {"half_size", json_of(r.half_size)}};
     const Prism& p = r.prism;
-    return {{"by", "prism"},       {"at", json_of(p.at)},
-            {"u", json_of(p.u)},   {"v", json_of(p.v)},
-            {"up", json_of(p.up)}, {"corners", json_of_line(p.corners)},
-            {"low", p.low},        {"high", p.high}};
+    return {{"by", "prism"},     {"at", json_of(p.at)}, {"u", json_of(p.u)},
+            {"v", json_of(p.v)}, {"up", json_of(p.up)}, {"corners", json_of_line(p.corners)},
+            {"low", p.low},      {"high", p.high}};
 }
 
 json json_of_selector(const Selector& what) {
