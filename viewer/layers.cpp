@@ -23,7 +23,7 @@ LayerPose pose_of(const Similarity& moved) {
     // At a right angle about y, turns about x and z are the same.
     constexpr double kRight = 1 - 1e-12;
     if (std::abs(sine) > kRight) turn = {std::atan2(-m[2][1], m[1][1]), turn.y, 0};
-    return {moved.translation, glm::degrees(turn), moved.scale};
+    return {moved.translation, glm::degrees(turn) + 0.0, moved.scale};  // 0 for -0
 }
 
 Similarity moved_by(const LayerPose& pose) {
@@ -103,7 +103,7 @@ Project project_of_session(const Session& s) {
         project.path.push_back({key.seconds, {key.eye, key.orientation, key.fov_y}});
     const glm::vec3 ground = s.display.background;
     project.view = ProjectView{camera_of_view(s.navigation), s.navigation.distance, s.navigation.up,
-                               glm::dvec3(ground)};
+                               glm::dvec3(ground), s.navigation.centre_x};
     return project;
 }
 
@@ -120,6 +120,7 @@ bool take_project(const Project& project, Session& s) {
     s.navigation.set_up(project.view->up);
     look_from_camera(project.view->camera, s);
     s.navigation.distance = std::max(project.view->distance, 1e-9);
+    s.navigation.centre_x = project.view->centre_x;
     s.display.background = glm::vec3(project.view->background);
     return true;
 }

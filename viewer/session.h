@@ -124,12 +124,16 @@ struct ProjectState {
 
 /// The list of layers in the panel.
 struct OutlinerState {
-    int active = 0;                  // the layer whose numbers are shown
-    bool editing = false;            // whether a number is being typed
-    LayerPose pose;                  // while it is
-    std::string renaming;            // the name that is being typed; empty: none
-    bool shown = false;              // whether the list was drawn in the last frame
-    glm::dvec2 low{0.0}, high{0.0};  // its corners, px of the window
+    int version = -1;                 // Edit::version of the next two
+    std::vector<std::size_t> splats;  // of each layer that are not deleted
+    std::vector<std::string> losses;  // Edit::losses_together
+    std::size_t count = 0;            // layers when the list was drawn last
+    int active = 0;                   // the layer whose numbers are shown
+    bool editing = false;             // whether a number is being typed
+    LayerPose pose;                   // while it is
+    std::string renaming;             // the name that is being typed; empty: none
+    bool shown = false;               // whether the list was drawn in the last frame
+    glm::dvec2 low{0.0}, high{0.0};   // its corners, px of the window
     /// Whether a file dropped there is added.
     bool has(double x, double y) const {
         return shown && x >= low.x && x <= high.x && y >= low.y && y <= high.y;

@@ -7,14 +7,11 @@
 #include <utility>
 
 #include "engine/core/error.h"
+#include "engine/scene/edit_text.h"
 
 namespace darb {
 
 namespace {
-
-std::string counted_splats(const char* verb, std::size_t count) {
-    return fmt::format("{} {} splat{}", verb, count, count == 1 ? "" : "s");
-}
 
 void count_from(const glm::dvec3& origin, SplatModel& model) {
     const glm::dvec3 shift = model.origin - origin;
@@ -39,6 +36,10 @@ void raise_sh_degree(int degree, SplatModel& model) {
 }
 
 }  // namespace
+
+std::string counted_splats(const char* verb, std::size_t count) {
+    return fmt::format("{} {} splat{}", verb, count, count == 1 ? "" : "s");
+}
 
 LayerLook look_of(const SplatModel& model) {
     return {model.kernel, model.footprint, model.antialias};

@@ -13,6 +13,7 @@
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/dot_splat.h"
 #include "engine/scene/edit.h"
+#include "engine/scene/edit_text.h"
 
 namespace darb {
 

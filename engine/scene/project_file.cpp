@@ -131,6 +131,7 @@ ProjectView project_view_in(JsonFields fields) {
     view.up = direction_in(fields, "up");
     if (fields.has("background")) view.background = fields.vector("background");
     view.background = glm::clamp(view.background, 0.0, 1.0);
+    view.centre_x = fields.number_or("centre_x", 0, 1, view.centre_x);
     fields.done();
     return view;
 }
@@ -162,6 +163,7 @@ void put_view(const ProjectView& view, json& whole) {
     j["distance"] = view.distance;
     j["up"] = json_of(view.up);
     j["background"] = json_of(view.background);
+    j["centre_x"] = view.centre_x;
     whole["view"] = std::move(j);
 }
 

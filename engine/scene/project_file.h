@@ -42,6 +42,7 @@ struct ProjectView {
     double distance = 1;         // world, from the eye to what it turns around
     glm::dvec3 up{0, -1, 0};     // unit vector
     glm::dvec3 background{0.0};  // sRGB, 0 to 1
+    double centre_x = 0.5;       // share of the width left of the middle of what is looked at
 };
 
 struct Project {

@@ -93,7 +93,7 @@ SplatModel result_of(const EditFlags& flags, const EditedScene& scene) {
     return scene.saved(scene.edit.layers()[scene.edit.layer_named(flags.layer)]);
 }
 
-int edit(const EditFlags& flags) {
+int edit_as_asked(const EditFlags& flags) {
     Paths inputs = together({files_of(flags.scene), files_of(flags.script)});
     for (const std::filesystem::path& file : flags.add) inputs = together({inputs, files_of(file)});
     refuse_to_overwrite_inputs({flags.output, flags.record}, inputs, Replaces::all);
@@ -170,7 +170,7 @@ void add_edit(CLI::App& app, Action& action) {
     command->add_option("--record", flags->record, "write all edits to this file as a script");
     add_quiet_flag(*command, flags->quiet);
     add_unit_options(*command, flags->units);
-    command->callback([flags, &action] { action = [flags] { return edit(*flags); }; });
+    command->callback([flags, &action] { action = [flags] { return edit_as_asked(*flags); }; });
 }
 
 }  // namespace darb

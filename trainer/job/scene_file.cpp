@@ -218,7 +218,15 @@ EditedScene load_edited_scene(const fs::path& path, SplatFile* facts, const Stor
                 throw Error(file.string(),
                             "is a project, and a project cannot be a layer of another",
                             "Save its layers together as one file, and name that.");
-            return load_scene(file, facts, units);
+            SplatFile part;
+            SplatModel model = load_scene(file, &part, units);
+            if (facts == nullptr) return model;
+            part.bytes += facts->bytes;
+            part.dropped += facts->dropped;
+            part.notes.insert(part.notes.begin(), facts->notes.begin(), facts->notes.end());
+            part.up = facts->bytes == 0 ? part.up : facts->up;  // that of the first
+            *facts = std::move(part);
+            return model;
         });
     }
     EditedScene scene;

@@ -13,6 +13,16 @@ namespace darb {
 
 namespace {
 
+// Counted once for each edit, as there may be millions of splats.
+void count_layers(Session& s) {
+    OutlinerState& o = s.outliner;
+    if (o.version == s.edit.version()) return;
+    o.version = s.edit.version();
+    o.splats.clear();
+    for (const SceneLayer& layer : s.edit.layers()) o.splats.push_back(s.edit.count_in(layer));
+    o.losses = s.edit.losses_together();
+}
+
 void layer_row(std::size_t n, Session& s) {
     const SceneLayer layer = s.edit.layers()[n];  // a copy, as an edit changes the list
     OutlinerState& o = s.outliner;
@@ -31,7 +41,7 @@ void layer_row(std::size_t n, Session& s) {
     tip(layer.file.empty() ? "Selects its splats, which 6, 7 and 8 then move, turn and scale"
                            : layer.file.string().c_str());
     ImGui::SameLine();
-    ImGui::TextDisabled("%zu", s.edit.count_in(layer));
+    ImGui::TextDisabled("%zu", o.splats[n]);
     tip("Splats of the layer that are not deleted");
     ImGui::PopID();
 }
@@ -110,13 +120,23 @@ void name_field(const SceneLayer& layer, Session& s) {
 }  // namespace
 
 void layers_panel(Session& s) {
-    s.outliner.shown = false;
-    if (!s.scene || !ImGui::CollapsingHeader("Layers", ImGuiTreeNodeFlags_DefaultOpen)) return;
-    ImGui::PushID("layers");
     OutlinerState& o = s.outliner;
+    o.shown = s.scene != nullptr;
+    if (!s.scene) return;
     const ImVec2 corner = ImGui::GetCursorScreenPos();
-    for (std::size_t n = 0; n < s.edit.layers().size(); ++n) layer_row(n, s);
-    for (const std::string& loss : s.edit.losses_together()) ImGui::TextWrapped("%s", loss.c_str());
+    const std::size_t layers = s.edit.layers().size();
+    if (layers > 1 && o.count <= 1) ImGui::SetNextItemOpen(true);
+    o.count = layers;
+    const bool open = ImGui::CollapsingHeader("Layers");
+    tip("Scenes that lie together in this window. A file that is dropped here, or anywhere with "
+        "Shift held, is added as a layer");
+    o.low = {corner.x, corner.y};
+    o.high = {corner.x + ImGui::GetContentRegionAvail().x, ImGui::GetCursorScreenPos().y};
+    if (!open) return;
+    ImGui::PushID("layers");
+    count_layers(s);
+    for (std::size_t n = 0; n < o.splats.size() && n < s.edit.layers().size(); ++n) layer_row(n, s);
+    for (const std::string& loss : o.losses) ImGui::TextWrapped("%s", loss.c_str());
     if (ImGui::Button("Add ...")) s.ask(request::ShowOpen{true});
     tip("Add a scene as a layer. Files that are dropped on this list, or with Shift held, are "
         "added, too");
@@ -137,10 +157,7 @@ void layers_panel(Session& s) {
             ImGui::TreePop();
         }
     }
-    const ImVec2 end = ImGui::GetCursorScreenPos();
-    o.low = {corner.x, corner.y};
-    o.high = {corner.x + ImGui::GetContentRegionAvail().x, end.y};
-    o.shown = true;
+    o.high.y = double{ImGui::GetCursorScreenPos().y};
     if (keeps_project(s)) {
         path_field("project", s.project.to_save);
         tip("Keeps layers, edits, measurements, notes, camera path and view; the splats stay in "
