@@ -127,12 +127,12 @@ def check_slow(page, url, arguments, name, failures):
 
 
 def check_cut(page, url, name, failures):
-    """Cut after the first picture: the page says so, asks again ever more seldom, and goes on when the line is back."""
+    """The line fails for the finest level: the page shows what it has and says so, asks again ever more seldom, and goes on
+    when the line is back."""
     page.call("Network.clearBrowserCache")
-    line(page, slow=True)
+    page.call("Network.setBlockedURLs", urls=["*/0_*/*"])
     page.open(url)
-    wait_for(page, "darb.state.shown", 60)
-    line(page, offline=True)
+    page_check.check(failures, wait_for(page, "darb.state.shown", 120) is not None, f"{name}: nothing is shown while the line fails for the finest level")
     said = wait_for(page, "darb.state.cut && document.getElementById('note').innerText.includes('network does not answer')", 30)
     page_check.check(failures, said is not None, f"{name}: nothing is said while the line is cut")
     before = page.run("darb.state")
@@ -140,7 +140,7 @@ def check_cut(page, url, name, failures):
     after = page.run("darb.state")
     page_check.check(failures, after["missing"] > 0, f"{name}: nothing was missing when the line was cut")
     page_check.check(failures, 0 < after["requests"] - before["requests"] <= 30, f"{name}: {after['requests'] - before['requests']} requests in 4 s over a cut line")
-    line(page)
+    page.call("Network.setBlockedURLs", urls=[])
     whole = wait_for(page, "darb.state.missing === 0 && !darb.state.cut && document.getElementById('note').hidden", 60)
     page_check.check(failures, whole is not None, f"{name}: it does not go on when the line is back: {page.run('darb.state')}")
     return whole

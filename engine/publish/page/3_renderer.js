@@ -88,12 +88,13 @@ class Renderer {
     this.finishLevel(level);
   }
 
+  // One level is drawn at a time: the later ones, which are smaller, share what the first is projected into.
   finishLevel(level) {
-    const gl = this.gl;
+    const gl = this.gl, {projected, projection, order} = this.levels[0] || {};
     const formats = [gl.RGBA32UI, gl.RGBA32UI, ...scene.shaped ? [gl.R32UI] : []];
-    level.projected = formats.map(format => this.texture(gl.TEXTURE_2D, format, this.columns, level.rows));
-    level.projection = this.framebuffer(level.projected);
-    level.order = this.texture(gl.TEXTURE_2D, gl.R32UI, this.columns, level.rows);
+    level.projected = projected || formats.map(format => this.texture(gl.TEXTURE_2D, format, this.columns, level.rows));
+    level.projection = projection || this.framebuffer(level.projected);
+    level.order = order || this.texture(gl.TEXTURE_2D, gl.R32UI, this.columns, level.rows);
     const failure = gl.getError();
     if (failure) throw Error(failure === gl.OUT_OF_MEMORY ? `${level.rows * this.columns} splats do not fit into the memory of this device` : `WebGL error ${failure}`);
     this.levels.push(level);

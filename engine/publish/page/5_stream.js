@@ -11,7 +11,7 @@ const parting = () => new DOMException("not wanted any more", "AbortError");
 function budgetOfDevice() {
   const asked = /^(\d+(?:\.\d+)?)([kM]?)$/.exec(new URLSearchParams(location.search).get("budget") || "");
   if (asked) return Math.max(1, Math.round(asked[1] * {"": 1, k: 1e3, M: 1e6}[asked[2]]));
-  const phone = navigator.userAgentData?.mobile ?? matchMedia("(pointer: coarse)").matches;
+  const phone = navigator.userAgentData?.mobile || matchMedia("(pointer: coarse)").matches;
   return (phone ? 0.25e6 : 0.5e6) * Math.min(8, navigator.deviceMemory || (phone ? 4 : 8));
 }
 

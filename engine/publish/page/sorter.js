@@ -43,9 +43,11 @@ function sort({position, keys, other, order, otherOrder}, ranges, row, centre, n
 
 onmessage = ({data}) => {
   if (data.merge) {
-    for (let level = 1, splats = data.merge; level <= data.levels; ++level) {
+    let splats = data.merge;
+    data.merge = null;
+    for (let level = 1; level <= data.levels; ++level) {
       splats = merged(splats, data);
-      postMessage({level, splats});
+      postMessage({level, splats}, level === data.levels ? [splats.position, ...splats.layers].map(a => a.buffer) : []);
     }
   } else if (data.at !== undefined) {
     levels[data.level].position.set(data.position, 3 * data.at);
