@@ -121,6 +121,7 @@ std::vector<std::vector<std::uint32_t>> FramesUnderWay::turn(bool wait) {
     make_viewer(options_);
     load(file_);
     session().panels = true;
+    session().gui_scale = 0.3f;  // leaves a part of the picture in sight
     for (int i = 0; i < 3; ++i) shot(false);
     constexpr int kFrames = 16, kWide = 200;
     std::vector<Buffer> copies;

@@ -236,7 +236,7 @@ TEST_F(WindowTest, Panels_grow_with_the_dots_per_inch_slow) {
     start({"-w"}, "800x600");
     EXPECT_TRUE(eventually([&] {
         const ImageU8 now = screen();
-        return now.at(150, 590, 0) == bare.at(150, 590, 0) && now.at(400, 590, 0) < 100;
+        return now.at(100, 590, 0) > 120 && now.at(400, 590, 0) < 100;
     })) << log("view.log");
     EXPECT_GT(bare.at(400, 590, 0), 120);
 }
@@ -244,21 +244,20 @@ TEST_F(WindowTest, Panels_grow_with_the_dots_per_inch_slow) {
 // What a hand does first: a menu, a tool of the toolbar, an axis in the corner, the grid.
 TEST_F(WindowTest, Menus_toolbar_axes_and_grid_are_clicked_slow) {
     start({}, "800x600");
-    xdo({"mousemove", "250", "500"});
-    const ImageU8 before = settled();
-    xdo({"mousemove", "147", "11", "click", "1"});
-    ASSERT_TRUE(changes_from(before, 50)) << "the menu View";
-    xdo({"key", "Escape", "mousemove", "250", "500"});
-    ASSERT_TRUE(shows(before)) << "the menu is closed";
-    xdo({"mousemove", "22", "87", "click", "1", "mousemove", "250", "500"});
-    EXPECT_TRUE(changes_from(before, 50)) << "the rectangle of the toolbar";
-    xdo({"key", "1"});
-    settled();
-    xdo({"key", "g"});
-    const ImageU8 gridded = settled();
-    EXPECT_GT(largest_difference(gridded, before), 20) << "the grid";
-    xdo({"mousemove", "436", "85", "click", "1"});
-    EXPECT_TRUE(changes_from(gridded, 50)) << "the axis x";
+    const auto changes = [&](const Words& hand, const char* what) {
+        const ImageU8 before = settled();
+        xdo(hand);
+        EXPECT_TRUE(changes_from(before, 20)) << what;
+    };
+    const Words away{"mousemove", "250", "500"};
+    ASSERT_TRUE(eventually([&] { return settled().at(600, 300, 0) < 100; })) << "no properties";
+    changes({"mousemove", "147", "11", "click", "1"}, "the menu View");
+    changes({"key", "Escape"}, "it closes");
+    changes({"mousemove", "22", "87", "click", "1"}, "the rectangle of the toolbar");
+    xdo(away);
+    changes({"key", "1"}, "orbiting again");
+    changes({"key", "g"}, "the grid");
+    changes({"mousemove", "428", "85", "click", "1"}, "the axis x");
 }
 
 // Each format in turn dropped on one running viewer; between them a file that is none.
