@@ -107,23 +107,24 @@ LccRange lcc_range(const LccJson& attributes, const char* name, const char* othe
     return range;
 }
 
-LccMeta lcc_meta(const LccJson& json, const LccFolder& folder) {
+LccMeta lcc_meta(const LccJson& meta_json, const LccFolder& folder) {
     LccMeta meta;
-    meta.levels = lcc_number(json, "totalLevel");
+    meta.levels = lcc_number(meta_json, "totalLevel");
     if (meta.levels == 0 || meta.levels > kMostLccLevels)
         throw Error(folder.where, fmt::format("declares {} levels of detail", meta.levels),
                     kCopyAgain);
     for (std::size_t level = 0; level < meta.levels; ++level)
-        meta.splats.push_back(json.at("splats").at(level).get<std::uint64_t>());
-    if (const std::string encoding = json.value("encoding", "COMPRESS"); encoding != "COMPRESS")
+        meta.splats.push_back(meta_json.at("splats").at(level).get<std::uint64_t>());
+    if (const std::string encoding = meta_json.value("encoding", "COMPRESS");
+        encoding != "COMPRESS")
         throw Error(folder.where, fmt::format("has the encoding {}", printable(encoding)),
                     "Export it with the encoding COMPRESS, the one that is known.");
-    const std::string type = json.value("fileType", "");
+    const std::string type = meta_json.value("fileType", "");
     if (type != "Portable" && type != "Quality" && !type.empty())
         throw Error(folder.where, fmt::format("has the fileType {}", printable(type)),
                     "Export it as Portable or Quality, which are known.");
     meta.harmonics = type == "Quality" || (type.empty() && !folder.find("shcoef.bin").empty());
-    const LccJson& attributes = json.at("attributes");
+    const LccJson& attributes = meta_json.at("attributes");
     meta.scale = lcc_range(attributes, "scale", "scale");
     meta.far_scale = lcc_range(attributes, "scale", "envscale");
     if (meta.harmonics) {
@@ -302,9 +303,9 @@ SplatModel read_lcc(const LccMeta& meta, const LccFolder& folder, std::size_t le
     return model;
 }
 
-void note_lcc_frame(const LccJson& json, SplatFile& file) {
+void note_lcc_frame(const LccJson& meta_json, SplatFile& file) {
     const auto is = [&](const char* key, double usual) {
-        const LccJson list = json.value(key, LccJson::array());
+        const LccJson list = meta_json.value(key, LccJson::array());
         return std::ranges::all_of(list, [&](const LccJson& one) {
             return one.is_number() && one.get<double>() == usual;
         });
@@ -319,9 +320,10 @@ SplatModel load_lcc(const SplatSource& source, SplatFile& file) try {
         throw Error(source.where, "describes an LCC scene, whose files are not here",
                     "Name its .lcc file in its folder.");
     const auto* begin = reinterpret_cast<const char*>(source.bytes.data());
-    const LccJson json = parse_json_text({begin, source.bytes.size()}, source.where, kCopyAgain);
+    const LccJson meta_json =
+        parse_json_text({begin, source.bytes.size()}, source.where, kCopyAgain);
     const LccFolder folder{source.folder, source.where};
-    const LccMeta meta = lcc_meta(json, folder);
+    const LccMeta meta = lcc_meta(meta_json, folder);
     const std::size_t level = level_to_read(source, meta.levels);
     file.details = fmt::format(
         "Data Organization Format originated from XGRIDS; level {} of 0 "
@@ -330,7 +332,7 @@ SplatModel load_lcc(const SplatSource& source, SplatFile& file) try {
     file.up = "z";
     SplatModel model = read_lcc(meta, folder, level, file);
     model.metres_per_unit = 1;
-    note_lcc_frame(json, file);
+    note_lcc_frame(meta_json, file);
     if (meta.levels > 1 && !source.units.level) file.notes.push_back(level_note(meta.levels));
     file.dropped = drop_non_finite(model);
     return model;
