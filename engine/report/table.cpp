@@ -197,11 +197,13 @@ std::string csv_table(const Table& whole) {
     const Table table = without_empty_columns(whole);
     std::vector<CsvColumns> has;
     std::string head, body;
+    bool first_head = true;
     for (std::size_t c = 0; c < table.columns.size(); ++c) {
         has.push_back(csv_columns(table, c));
         const auto add = [&](bool there, const char* what) {
-            if (there)
-                head += (head.empty() ? "" : ",") + csv_field(header_of(table.columns[c]) + what);
+            if (!there) return;
+            head += (first_head ? "" : ",") + csv_field(header_of(table.columns[c]) + what);
+            first_head = false;
         };
         add(has[c].value, "");
         add(has[c].deviation, ", standard deviation");

@@ -127,6 +127,12 @@ TEST(TableCsv, Fields_areQuotedAndNumbersWhole) {
               "m,2,1,1,3,3\r\n");
 }
 
+TEST(TableCsv, ColumnWithoutAName_keepsItsPlace) {
+    Table table = one_column({1.0}, Better::more);
+    table.columns[0].name.clear();
+    EXPECT_EQ(csv_table(table), ",PSNR (dB)\r\nm,1\r\n");
+}
+
 TEST(TableLatex, Best_isBoldAndSecondUnderlined) {
     const std::string tex = latex_table(one_column({3.0, 2.0, -1.0}, Better::more));
     EXPECT_NE(tex.find("PSNR (dB) $\\uparrow$"), std::string::npos) << tex;
