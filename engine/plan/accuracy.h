@@ -62,8 +62,6 @@ struct Accuracy {
 
 /// The preset's choices; in training those that training does not know stay at their default.
 Accuracy preset_accuracy(int preset, bool training = false);
-/// The choice of kDepthOrder under which no splats swap places as the camera turns: --steady.
-inline constexpr std::string_view kSteadyOrder = "pixel";
 /// Index of a choice. Throws Error that lists the names; in training also where the choice is
 /// there for pictures only.
 int find_choice(int setting, std::string_view name, bool training = false);

@@ -32,11 +32,6 @@ void add_accuracy_flags(CLI::App& command, AccuracyFlags& flags) {
                         accuracy_help(setting))
             ->group(option_group::kAccuracy);
     }
-    command
-        .add_flag("--steady", flags.steady,
-                  "the same as --depth-order pixel: splats do not pop, that is swap places, as the "
-                  "camera turns")
-        ->group(option_group::kAccuracy);
 }
 
 Accuracy chosen_accuracy(const AccuracyFlags& flags) {
@@ -46,12 +41,6 @@ Accuracy chosen_accuracy(const AccuracyFlags& flags) {
         const std::string& name = flags.choice[static_cast<size_t>(s)];
         if (!name.empty()) accuracy.choice[s] = find_choice(s, name);
     }
-    if (!flags.steady) return accuracy;
-    const std::string& order = flags.choice[kDepthOrder];
-    if (!order.empty() && order != kSteadyOrder)
-        throw Error("--steady", "stands beside --depth-order " + order,
-                    "Leave out one of them: --steady is --depth-order pixel.");
-    accuracy.choice[kDepthOrder] = find_choice(kDepthOrder, kSteadyOrder);
     return accuracy;
 }
 

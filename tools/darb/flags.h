@@ -21,7 +21,6 @@ namespace darb {
 struct AccuracyFlags {
     std::string preset;                              // empty: balanced
     std::array<std::string, kAccuracyCount> choice;  // empty: the preset's choice
-    bool steady = false;                             // --depth-order pixel by another name
 };
 
 /// For pictures; for training they are rows of trainer/job/request_options.h.

@@ -48,6 +48,10 @@ class OptionNames : public testing::Test {
             {"--render-scale", "1"},  // training takes no other
             {"--blocks", "3x2"},
             {"--tune", "scan=thread"},
+            {"--points", (folder_ / "scan.las").string()},
+            {"--roi", "sphere:1,2,3,4"},
+            {"--clean-haze", "0.1,5"},
+            {"--clean-free-space", "3"},
             {"--start-checkpoint", (folder_ / "begin.darb").string()}};
         const std::string name = option_name(option.row);
         if (const auto found = own.find(name); found != own.end()) return found->second;
