@@ -14,9 +14,9 @@
 namespace darb {
 
 /// Parses a list of {id, img_name, width, height, position, rotation, fx, fy} and, where the
-/// principal point is off the centre, cx and cy; where its shutter rolls, shutter {turn, move} of
-/// engine/scene/camera.h. rotation has the rows of camera to world. The
-/// views have no photo. Throws Error naming the record.
+/// principal point is off the centre, cx and cy; where the shutter rolls, shutter {turn, move}, as
+/// in engine/scene/camera.h. rotation has the rows of camera to world. The views have no photo.
+/// Throws Error naming the record.
 std::vector<View> parse_camera_list(std::string_view json, const std::string& where);
 /// A camera_path.json as nerfstudio's viewer exports it: one camera per frame, named frame_00000
 /// and so on.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What a plot is made of, as shapes, and its three writers: an SVG element inside a page, an SVG
-// file that stands alone, and a PDF file of vectors. The plots of svg_plot.h make such drawings.
+// Drawing: the shapes that a plot is made of. Three functions write it: as an SVG element inside a
+// page, as an SVG file that stands alone, and as a PDF file of vectors. The plots of svg_plot.h
+// become such drawings.
 #pragma once
 
 #include <string>
@@ -12,18 +13,18 @@ namespace darb {
 enum class Anchor { start, middle, end };
 
 struct PathStep {
-    char command = 'M';  // M: begins a line, L: goes on with it, z: closes it
+    char command = 'M';  // M: begins a line, L: continues it, z: closes it
     double x = 0, y = 0;
 };
 
 struct Shape {
     enum class Kind { path, circle, text } kind = Kind::path;
-    /// Its class on the page: line, area, band, grid, axis, whisker; name, label or tick for text;
-    /// "" for a circle.
+    /// The CSS class on the page: line, area, band, grid, axis or whisker for a path; name, label
+    /// or tick for text; "" for a circle.
     std::string style;
-    int series = -1;  // colour; -1: that of the style
+    int series = -1;  // gives the colour; -1: the style does
     std::vector<PathStep> path;
-    double x = 0, y = 0, radius = 0;  // of a circle, or where a text stands
+    double x = 0, y = 0, radius = 0;  // centre and radius of a circle; where a text stands
     std::string text;
     Anchor anchor = Anchor::start;
     bool upright = false;  // the text runs upwards
@@ -49,11 +50,12 @@ struct Drawing {
 std::string svg_inline(const Drawing& drawing);
 /// A whole file, black on white.
 std::string svg_file(const Drawing& drawing);
-/// A page of the drawing's size, 0.75 pt a unit. Text is Helvetica, which every reader has; the
-/// file does not hold the font. Letters beyond Windows-1252 become question marks.
+/// A PDF file of one page of the drawing's size, 0.75 pt a unit. Text is in Helvetica, which every
+/// reader has, so the file does not contain the font. Letters beyond Windows-1252 become question
+/// marks.
 std::string pdf_file(const Drawing& drawing);
 
-/// The characters of UTF-8 text; bytes that are none become U+FFFD.
+/// The characters of UTF-8 text; bytes that are not valid UTF-8 become U+FFFD.
 std::vector<char32_t> code_points(std::string_view text);
 
 }  // namespace darb

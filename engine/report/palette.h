@@ -24,7 +24,7 @@ std::string css_colour(const PaletteColour& colour);
 struct Palette {
     PaletteColour ink, soft;               // text, and text that matters less
     PaletteColour line;                    // edges and grid lines
-    PaletteColour page, card;              // the ground, and what lies on it
+    PaletteColour page, card;              // the background, and panels on it
     std::array<PaletteColour, 14> series;  // curves and legends, in their order
 };
 
@@ -41,7 +41,7 @@ inline constexpr Palette kLight{
      palette_colour(0xb23a6b), palette_colour(0x6b7280), palette_colour(0x7a5a3a),
      palette_colour(0x4a4ac0), palette_colour(0x7fb0e0), palette_colour(0xe8a33d),
      palette_colour(0x0f5132), palette_colour(0xd88bd0)}};
-/// That of the window and of web pages, and of reports on dark screens.
+/// For the window and web pages, and for reports on dark screens.
 inline constexpr Palette kDark{
     palette_colour(0xeef0f3),
     palette_colour(0xbfc7d4),
@@ -54,11 +54,11 @@ inline constexpr Palette kDark{
      palette_colour(0x9393f5), palette_colour(0x2f6db3), palette_colour(0xb3701a),
      palette_colour(0xb7f0cf), palette_colour(0xa04f97)}};
 
-/// The axes x, y and z, of a gizmo and in the corner.
+/// The axes x, y and z, in a gizmo and in the corner of the window.
 inline constexpr std::array<PaletteColour, 3> kAxes{
     palette_colour(0xf05f5f), palette_colour(0x78cd5f), palette_colour(0x699bfa)};
 
-// Controls on dark ground.
+// Controls on a dark background.
 inline constexpr PaletteColour kAccent = kDark.series[0];
 inline constexpr PaletteColour kButton = palette_colour(0x2f3742);
 inline constexpr PaletteColour kHovered = palette_colour(0x2c4a74);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A report: headings, tables, plots and pictures in order. It becomes one page, and the files that
-// a paper takes in: each table as CSV and LaTeX, each plot as SVG and PDF, each picture as PNG.
+// A report: headings, tables, plots and pictures in order. It becomes one page, and also files for
+// use in a paper: each table as CSV and LaTeX, each plot as SVG and PDF, each picture as PNG.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ namespace darb {
 using AnyPlot = std::variant<Plot, StackPlot, BarPlot, Drawing>;
 
 struct Figure {
-    std::string name;  // of its files; empty: from the plot's title
+    std::string name;  // of its files; empty: made from the plot's title
     AnyPlot plot;
 };
 
@@ -36,17 +36,18 @@ class Report {
     /// Text for the page alone.
     void heading(const std::string& text, int level = 2);
     void html(const std::string& fragment) { body_ += fragment; }
-    /// heading_level: of its title on the page; 0: without.
+    /// heading_level: the level of the table's title on the page; 0: no title.
     void table(Table table, int heading_level = 3);
-    /// Plots side by side. legend: names of the series of all of them, for plots with a legend
-    /// beside them.
+    /// Plots side by side. legend: the names of the series that the plots share. The page shows
+    /// them once, for plots with legend_beside.
     void plots(std::vector<Figure> figures, const std::vector<std::string>& legend = {});
-    /// A picture for the folder alone. png: a whole file.
+    /// A picture that only files() has, not the page. png: the content of a whole PNG file.
     void picture(const std::string& name, std::vector<std::byte> png);
 
     /// The whole document.
     std::string page() const;
-    /// Their names are unlike each other on every file system. report.tex shows all of them.
+    /// Every file of the report, with names that differ also where case does not count.
+    /// report.tex shows all tables, plots and pictures.
     std::vector<ReportFile> files() const;
 
   private:

@@ -14,7 +14,7 @@ namespace darb {
 struct PlotSeries {
     std::string name = {};
     std::vector<std::pair<double, double>> points = {};  // (x, y); not finite: a gap
-    bool dots = false;                                   // one dot per point
+    bool dots = false;                                   // one dot for each point
     bool line = true;
     bool stairs = false;                   // the line keeps its value until the next point
     std::vector<std::string> titles = {};  // shown for dots under the pointer; empty: name and

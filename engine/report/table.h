@@ -43,11 +43,12 @@ struct TableCell {
 
 struct TableRow {
     std::vector<TableCell> cells;  // one for each column
-    bool ranked = true;            // false: it has no part in the contest, as a row of means
+    bool ranked = true;            // false: takes no part in the contest, such as the paper's row
     bool strong = false;           // a row that the page emphasises
 };
 
-/// Among what the best is sought: none; the rows of each column; the columns of each row.
+/// Where the best value is sought: nowhere; down each column, among the rows; across each row,
+/// among the columns.
 enum class Contest { none, down, across };
 
 struct Table {
@@ -61,10 +62,10 @@ struct Table {
 
 enum class Mark { none, best, second };
 
-/// [row][column]. best: no value is better. second: exactly one is, of at least three, and one is
-/// worse. Values are compared as they are printed, so that those which look equal are marked alike;
-/// where all are equal none is. Where a value has a span of several runs, best is only what no
-/// other's span overlaps, and none is second.
+/// [row][column]. best: no value is better. second: of three or more, exactly one is better and at
+/// least one is worse. Values are compared as they are printed, so that those which look equal are
+/// marked alike; if all are equal, none is marked. Where a value has a span of several
+/// runs, the best is marked only if no other span overlaps its own, and nothing is second.
 std::vector<std::vector<Mark>> marks_of(const Table& table);
 
 /// The table without columns that are empty in every row.
@@ -78,12 +79,14 @@ std::string cell_text(const TableCell& cell, const TableColumn& column);
 /// A table element with its title as a heading of that level (0: none) and its caption.
 std::string html_table(const Table& table, int heading_level = 3);
 
-/// RFC 4180, UTF-8: a line of names with units, then the rows. Numbers are whole, without separated
-/// thousands. A column with deviations, spans or runs has one more column for each of these.
+/// RFC 4180, UTF-8: a line of names with units, then the rows. Numbers have all their digits and no
+/// separators of thousands. Deviations, the two ends of spans, and numbers of runs have columns of
+/// their own.
 std::string csv_table(const Table& table);
 
-/// A table environment for the package booktabs, or a longtable where it would not fit a page: the
-/// best bold, the second best underlined, arrows for the direction. Text is escaped.
+/// A table environment for the package booktabs, or a longtable where it would not fit a page. The
+/// best is bold, the second best underlined, and arrows tell which direction is better. Text is
+/// escaped.
 std::string latex_table(const Table& table);
 
 /// Aligned columns, with a star where a value is the best.
@@ -93,7 +96,7 @@ std::string text_table(const Table& table);
 /// beyond Latin Extended-A, which pdflatex may lack, as [U+4E2D].
 std::string latex_escape(std::string_view text);
 
-/// Lower-case letters, digits and - for a part of a file's name; never empty.
+/// The text as part of a file's name, in lower-case letters, digits and -; never empty.
 std::string file_name(std::string_view text);
 
 }  // namespace darb

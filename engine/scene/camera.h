@@ -29,13 +29,13 @@ struct LensTerms {
 };
 
 /// A rolling shutter: the rows of a picture are exposed one after the other while the camera moves.
-/// At the time t of a row, -1/2 at the top edge and 1/2 at the bottom, with p the pose of the
-/// middle row,
+/// The time t of a row is -1/2 at the top edge and 1/2 at the bottom. With p_camera a point in the
+/// camera of the middle row, the camera of that time has it at
 ///   p_camera(t) = exp(t turn) (p_camera - t move).
 struct ShutterTerms {
     bool active = false;   // false: all rows at once
-    glm::dvec3 turn{0.0};  // rad over the read-out, axis in the camera of the middle row
-    glm::dvec3 move{0.0};  // of the centre over the read-out, in that camera; world units
+    glm::dvec3 turn{0.0};  // of the world over the read-out, rad, in the camera of the middle row
+    glm::dvec3 move{0.0};  // of the camera's centre over it, in the same axes; world units
 };
 
 struct Camera {

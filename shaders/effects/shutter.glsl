@@ -18,7 +18,7 @@ struct ShutterMotion {
     vec3 swing;     // exp(t turn) move
     vec3 velocity;  // dp/dt
     vec2 pixel;     // d(pixel)/dt, px
-    float per_row;  // dt/d(row), 1/px; 0 where the time is held at its limit
+    float per_row;  // dt/d(row), 1/px; 0 where t is held at its limit
 };
 
 // j0, j1: rows of the projection's Jacobian at p.
@@ -32,8 +32,8 @@ ShutterMotion shutter_motion(CameraData camera, float t, vec3 p, vec3 j0, vec3 j
     return m;
 }
 
-// The time at which the row of a point is exposed, from the point in the camera of the middle row: Newton's steps on
-// row(t) / height - 1/2 = t.
+// The time at which the row of a point is exposed. middle: the point in the camera of the middle row. Newton's steps
+// on row(t) / height - 1/2 = t.
 float row_time(CameraData camera, vec3 middle) {
     float t = 0.0;
     for (int k = 0; k < SHUTTER_STEPS; ++k) {
@@ -43,13 +43,13 @@ float row_time(CameraData camera, vec3 middle) {
         jacobian_rows(camera, p, j0, j1);
         pixel_of(camera, p, pixel);
         const float rows = float(camera.height), speed = shutter_motion(camera, t, p, j0, j1).pixel.y;
-        precise const float miss = pixel.y - rows * (0.5 + t);  // as it stands, whatever pixel.y was made of
+        precise const float miss = pixel.y - rows * (0.5 + t);  // not fused with what pixel.y is made of
         t = clamp(t + miss / max(rows - speed, SHUTTER_SLOWEST * rows), -SHUTTER_LONGEST, SHUTTER_LONGEST);
     }
     return t;
 }
 
-// Takes the camera of the middle row to that of the point's row, and returns the time.
+// Turns the camera of the middle row into that of the point's row, and returns the time of that row.
 float take_row(inout CameraData camera, vec3 point) {
     const float t = row_time(camera, to_camera(camera, from_centre(camera, point)));
     camera.centre_rest += t * to_world(camera, camera.shutter_move);
@@ -74,7 +74,7 @@ struct ShutterGradient {
     float d_time;     // at a held p
 };
 
-// dL/dp at a held time from the gradients of the pixel and of the rows that add_shutter left, j. k: what they were
+// dL/dp at a held time, from the gradients of the pixel and of the Jacobian's rows. j: these rows after add_shutter; k:
 // before it.
 vec3 shutter_point_gradient(CameraData camera, ShutterMotion m, vec3 p, mat2x3 k, mat2x3 j, mat2x3 d_j, vec2 d_pixel,
                             out ShutterGradient g) {
@@ -88,7 +88,7 @@ vec3 shutter_point_gradient(CameraData camera, ShutterMotion m, vec3 p, mat2x3 k
     return camera_point_gradient(camera, p, g.d_k[0], g.d_k[1], d_pixel) + cross(g.d_velocity, camera.shutter_turn);
 }
 
-// J^T v of d exp(w) = [J dw] exp(w).
+// J^T v, with J from d exp(w) = [J dw] exp(w).
 vec3 left_jacobian_transposed(vec3 v, vec3 w) {
     const float square = dot(w, w), angle = sqrt(square), sine = sin(0.5 * angle);
     const float b = square < 1e-6 ? 0.5 - square / 24.0 : 2.0 * sine * sine / square;

@@ -24,7 +24,7 @@ Region region(const std::string& text) {
     return region_from("--roi", text, SplatModel(), cameras);
 }
 
-std::string error_of(const std::string& text) {
+std::string refusal_of(const std::string& text) {
     try {
         region(text);
     } catch (const Error& e) {
@@ -77,14 +77,14 @@ TEST(Region, text_repeats_every_region) {
 }
 
 TEST(Region, what_is_no_region_says_what_is) {
-    EXPECT_NE(error_of("cube:1").find("polygon:LOW,HIGH"), std::string::npos);
-    EXPECT_NE(error_of("box:1,1,1,0,2,2").find("holds nothing"), std::string::npos);
-    EXPECT_NE(error_of("sphere:0,0,0").find("not 4 numbers"), std::string::npos);
-    EXPECT_NE(error_of("subject:0").find("holds nothing"), std::string::npos);
-    EXPECT_NE(error_of("polygon:0,1,0,0,0,1,0,0").find("three corners"), std::string::npos);
-    EXPECT_NE(error_of("polygon:1,0,0,0,0,1,0,0,0,0,1").find("holds nothing"), std::string::npos);
-    EXPECT_NE(error_of("polygon:0,1,0,0,0,1,0,0,2,0,0").find("one line"), std::string::npos);
-    EXPECT_NE(error_of("polygon:0,1,0,0,0,1,0,0,0,1,0").find("upright"), std::string::npos);
+    EXPECT_NE(refusal_of("cube:1").find("polygon:LOW,HIGH"), std::string::npos);
+    EXPECT_NE(refusal_of("box:1,1,1,0,2,2").find("holds nothing"), std::string::npos);
+    EXPECT_NE(refusal_of("sphere:0,0,0").find("not 4 numbers"), std::string::npos);
+    EXPECT_NE(refusal_of("subject:0").find("holds nothing"), std::string::npos);
+    EXPECT_NE(refusal_of("polygon:0,1,0,0,0,1,0,0").find("three corners"), std::string::npos);
+    EXPECT_NE(refusal_of("polygon:1,0,0,0,0,1,0,0,0,0,1").find("holds nothing"), std::string::npos);
+    EXPECT_NE(refusal_of("polygon:0,1,0,0,0,1,0,0,2,0,0").find("one line"), std::string::npos);
+    EXPECT_NE(refusal_of("polygon:0,1,0,0,0,1,0,0,0,1,0").find("upright"), std::string::npos);
     EXPECT_THROW(check_region("--roi", "polygon:"), Error);
     EXPECT_NO_THROW(check_region("--roi", "subject"));
 }
