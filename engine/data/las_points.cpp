@@ -88,7 +88,7 @@ LasHeader read_las_header(std::span<const std::byte> file, const std::string& wh
         refuse_las(where, fmt::format("has points of {} bytes; those of format {} have {}",
                                       header.record, format, header.format.bytes));
     const std::uint64_t room = file.size() < header.begin ? 0 : file.size() - header.begin;
-    if (header.begin < size || header.points > room / header.record)
+    if (header.begin < size || header.begin > file.size() || header.points > room / header.record)
         refuse_las(where, fmt::format("declares {} points of {} bytes from byte {} on, but holds "
                                       "{} bytes",
                                       header.points, header.record, header.begin, file.size()));
