@@ -185,6 +185,7 @@ struct Worked {
     bool selected = false, mesh = false, run = false;
     int camera = -1;
     const void* scene = nullptr;
+    std::size_t layers = 0;
 };
 /// The tab of what has changed; nothing where nothing has that has a tab.
 std::optional<Tab> tab_of_change(const Worked& before, const Worked& now);

@@ -62,7 +62,7 @@ TEST_F(TrainedCommand, eval_measures_at_other_sizes) {
     const std::string file = scratch() / "scales.json", whole = scratch() / "whole.json";
     const Outcome o = darb(command + "-r 4 --scales 4,0.5,1 --json " + file);
     ASSERT_EQ(o.code, 0) << o.err;
-    EXPECT_NE(o.out.find("1/2       25 x 19"), std::string::npos) << o.out;
+    EXPECT_NE(o.out.find("1/2    25 x 19"), std::string::npos) << o.out;
     const json rows = json::parse(read_text_file(file)).at("scales");
     ASSERT_EQ(rows.size(), 3U);
     // Four times a quarter is the whole photo, and half of it what -r 8 loads.

@@ -192,6 +192,8 @@ def main():
         run(pathlib.Path(words[1]), words[2:])
     elif words[:1] == ["show"] and len(words) < 3:
         show(pathlib.Path(words[1]) if len(words) == 2 else FIGURES)
+    elif words and words[0] in ("-h", "--help"):
+        print(__doc__.strip())
     else:
         sys.exit(__doc__.strip())
 

@@ -6,14 +6,19 @@ Every --hold-out-th photo is still and is set aside, so that it judges the scene
 
     PYTHONPATH=build/python tools/lab/rolling_set.py SCENE CAMERAS.json OUT [--degrees 1] [--say read|none]
 """
+from __future__ import annotations
+
 import argparse
 import json
 import pathlib
 
-import darb
-import numpy as np
+try:
+    import darb
+    import numpy as np
+except ImportError:
+    darb = np = None
 
-OPENGL = np.diag([1.0, -1.0, -1.0])
+OPENGL = np and np.diag([1.0, -1.0, -1.0])
 SECONDS = 0.02  # of a read-out
 
 
@@ -56,6 +61,8 @@ def main() -> None:
     parser.add_argument("--say", choices=["read", "none"], default="read", help="whether transforms.json has the motion")
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
+    if np is None:
+        parser.error("numpy or the module darb is missing: build it, and set PYTHONPATH=build/python")
     random = np.random.default_rng(args.seed)
     scene = darb.Scene.read(args.scene)
     cameras = json.load(open(args.cameras))

@@ -214,9 +214,13 @@ void side_panels(Session& s, float width, float height) {
 }
 
 void follow_work(Session& s) {
-    const Worked now{s.tools.tool,      s.scene && s.edit.selected_count() > 0,
-                     s.mesh != nullptr, s.training.live && !s.training.finished,
-                     s.photos.current,  s.scene.get()};
+    const Worked now{s.tools.tool,
+                     s.scene && s.edit.selected_count() > 0,
+                     s.mesh != nullptr,
+                     s.training.live && !s.training.finished,
+                     s.photos.current,
+                     s.scene.get(),
+                     s.scene ? s.edit.layers().size() : 0};
     if (const std::optional<Tab> tab = tab_of_change(s.worked, now)) s.tab = *tab;
     s.worked = now;
 }
@@ -256,6 +260,7 @@ std::string cut_text(const std::string& text, float width) {
 std::optional<Tab> tab_of_change(const Worked& before, const Worked& now) {
     if (now.run && !before.run) return Tab::training;
     if (now.scene != before.scene && now.scene != nullptr) return Tab::scene;
+    if (now.layers > 1 && now.layers != before.layers) return Tab::scene;
     if (now.tool != before.tool && now.tool == Tool::measure) return Tab::measure;
     if (now.tool != before.tool && now.tool != Tool::navigate) return Tab::splats;
     if (now.selected && !before.selected) return Tab::splats;
