@@ -147,7 +147,7 @@ void layers_panel(Session& s) {
         const SceneLayer layer = s.edit.layers()[n];
         ImGui::SameLine();
         if (ImGui::Button("Save this layer")) s.ask(request::SaveScene{layer.name});
-        tip("Save the chosen layer alone, in its own kernel, beside the file of section Edit");
+        tip("Save the chosen layer alone, in its own kernel, beside the file named under Save as");
         order_buttons(layer, n, count, s);
         if (ImGui::TreeNode("Name and place")) {
             name_field(layer, s);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The sections of the side panel, one function each, and helpers that they share.
+// What the panels hold, one function each, and helpers that they share.
 #pragma once
 
 #include <imgui.h>
