@@ -127,7 +127,7 @@ constexpr Command kCommands[] = {
      Menu::file,
      "Add a scene ...",
      {"Ctrl+Shift+O"},
-     "Add the splats of another file to this scene, at the positions that they have there",
+     "Add the splats of another file as a layer, at the positions that they have there",
      Icon::none,
      false,
      [](Session& s) { s.ask(request::ShowOpen{true}); },

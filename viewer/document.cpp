@@ -557,7 +557,7 @@ void Document::save_scene(Device& device, const std::string& layer) {
 void Document::save_mesh() {
     Session& s = *session_;
     if (!s.mesh)
-        throw Error("mesh", "there is none to save", "Make one, or open one, in the section Mesh.");
+        throw Error("mesh", "there is none to save", "Make one, or open one, in the tab Mesh.");
     saved_.check(s.mesh_file);
     write_mesh(s.mesh_file, s.mesh->mesh);
     saved_.wrote(s.mesh_file);

@@ -113,6 +113,31 @@ TEST_F(LayersViewTest, A_drop_replaces_and_adds_only_with_shift_or_on_the_list) 
     EXPECT_EQ(session().edit.layers().size(), 3u);
 }
 
+TEST_F(LayersViewTest, A_note_has_a_label_in_the_picture) {
+    load(file_);
+    Session& s = session();
+    s.panels = true;
+    for (int i = 0; i < 3; ++i) viewer_->frame({}, 800, 600, true);
+    const auto window = [&] {
+        viewer_->frame({}, 800, 600, true);
+        viewer_->compose();
+        viewer_->canvas().submit_and_wait();
+        return viewer_->canvas().read_back();
+    };
+    const ImageU8 before = window();
+    SceneNote note;
+    note.at = s.navigation.pivot();
+    note.title = "here";
+    set_note(-1, note, s);
+    window();
+    const ImageU8 after = window();
+    ASSERT_EQ(before.data.size(), after.data.size());
+    int changed = 0;  // px of the picture itself, left of the properties
+    for (int y = 100; y < 500; ++y)
+        for (int x = 80; x < 400; ++x) changed += before.at(x, y, 0) != after.at(x, y, 0) ? 1 : 0;
+    EXPECT_GT(changed, 100);
+}
+
 TEST_F(LayersViewTest, A_project_opens_as_it_was_saved_with_its_history) {
     open_both();
     perform(edits::Remove{Region{Region::Shape::sphere, {0, 0, 0}, glm::dvec3(0.6)}, false});

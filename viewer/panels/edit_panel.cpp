@@ -260,8 +260,8 @@ void select_by_region(Session& s) {
 }
 
 void format_choice(Session& s) {
-    constexpr const char* kEndings[] = {".ply", ".compressed.ply", ".splat", ".spz", ".sog",
-                                        ".glb"};
+    constexpr const char* kEndings[] = {".ply", ".compressed.ply", ".splat", ".spz", ".sog", ".glb",
+                                        ".usda"};
     if (!ImGui::BeginCombo("format", "as ...")) {
         tip("Choose a format; this changes the file's ending");
         return;

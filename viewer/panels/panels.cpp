@@ -273,10 +273,12 @@ void draw_panels(Session& s) {
     const auto [width, height] = ImGui::GetIO().DisplaySize;
     follow_work(s);
     draw_panes(s);
+    s.outliner.shown = false;  // unless the list is drawn
     if (s.panels) {
         const int w = static_cast<int>(width), h = static_cast<int>(height);
         draw_guides(s, w, h);
         draw_measurement(s, w, h);
+        draw_notes(s, w, h);
         draw_tools(s, w, h);
         if (s.selection.shown) draw_region(s, w, h);
         draw_menus(s);

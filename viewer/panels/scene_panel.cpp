@@ -183,7 +183,7 @@ void open_window(Session& s) {
                             ImVec2(0.5f, 0.5f));
     ImGui::SetNextWindowSize(ImVec2(std::min(size.x, 520 * unit), std::min(size.y, 520 * unit)),
                              ImGuiCond_Appearing);
-    ImGui::Begin(dialog.merges ? "Merge a scene###open" : "Open a scene###open", &dialog.shown,
+    ImGui::Begin(dialog.merges ? "Add a scene###open" : "Open a scene###open", &dialog.shown,
                  ImGuiWindowFlags_NoCollapse);
     if (ImGui::Button("Up")) go_to(dialog.folder.parent_path(), dialog);
     tip("Go to the parent folder");

@@ -52,6 +52,23 @@ TEST(PageNotes, other_members_of_the_file_are_ignored) {
     EXPECT_TRUE(notes_of(R"({"notes": []})").empty());
 }
 
+// Half a turn about y looks along -z; 90 degrees see as far up as ahead.
+TEST(PageNotes, those_of_a_project_are_read) {
+    const auto notes = notes_of(R"({"darb_project": 1, "notes": [{"at": [1, 2, 3], "title": "Door",
+        "camera": {"eye": [1, 2, 7], "orientation": [0, 0, 1, 0], "fov_y_degrees": 90}}]})");
+    ASSERT_EQ(notes.size(), 1u);
+    ASSERT_TRUE(notes[0].view);
+    const Camera& c = notes[0].view->camera;
+    EXPECT_NEAR(glm::length(c.centre() - glm::dvec3(1, 2, 7)), 0, 1e-12);
+    const glm::dvec3 p = c.rotation * notes[0].at + c.translation;
+    EXPECT_NEAR(glm::length(p - glm::dvec3(0, 0, 4)), 0, 1e-12);
+    EXPECT_NEAR(c.fy, 0.5 * c.height, 1e-9);
+    EXPECT_NE(refusal(R"({"notes": [{"at": [1, 2, 3], "title": "a", "camera": {"eye": [1, 2, 7],
+        "orientation": [1, 0, 0], "fov_y_degrees": 90}}]})")
+                  .find("orientation"),
+              std::string::npos);
+}
+
 TEST(PageNotes, bad_ones_are_named) {
     const auto contains = [](const std::string& json, const char* part) {
         EXPECT_NE(refusal(json).find(part), std::string::npos) << json << "\n" << refusal(json);
