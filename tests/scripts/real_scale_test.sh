@@ -72,6 +72,20 @@ check "a stopped run is resumed" "train --resume -o $folder/out/runs/long-adc-8-
 check "and ends" "^long-adc-8-seed0: 25.50 dB" "$output"
 check "its checkpoint goes" "^gone$" "$([[ ! -e $folder/out/runs/long-adc-8-seed0/checkpoint.darb ]] && echo gone)"
 
+output=$(table --sets town_1200 --iterations 8 --strategies adc --make-scene "$folder/none")
+check "what makes a set is not built" "^town_1200: skipped, as $folder/out/sets/town_1200 is not there, which $folder/none" "$output"
+cat >"$folder/make_scene" <<'TEXT'
+#!/bin/sh
+echo "$@" >>"${0%/*}/made"
+mkdir "$2"
+TEXT
+chmod +x "$folder/make_scene"
+output=$(table --sets town_1200 --iterations 8 16 --strategies adc --make-scene "$folder/make_scene")
+check "a set is made" "^town_1200: made in 0 s$" "$output"
+check "and trained" "^town_1200-adc-16-seed0: 25.50 dB" "$output"
+check "from where it is" "^train $folder/out/sets/town_1200 -o" "$(tail -1 "$folder/out/runs/calls")"
+check "once, and kept when it is whole" "^town $folder/out/sets/town_1200.tmp 6 6$" "$(cat "$folder/made")"
+
 sed 's/25.5/25.75/; s/"seconds": 2.0/"seconds": 1.0/; s/c1/c2/' "$folder/out/real_scale.json" >"$folder/after.json"
 output=$("$script" page "$folder/after.json" "$folder/out/real_scale.json")
 check "a page of both" "^\| one \| 8 \| adc \| before \| 2.0 \| 1,000 \| 800 \| 25.50 \| 0.9000 \| 5 \|$" "$output"

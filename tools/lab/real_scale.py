@@ -3,8 +3,8 @@
 """Trains the table of real data sets, lengths and strategies, and writes what came of it as JSON and as a page.
 
     real_scale.py run [--out DIR] [--limit SECONDS] [--reduced [PX]] [--sets NAME...] [--iterations N...]
-                      [--strategies NAME...] [--seeds N...] [--data DIR] [--darb FILE] [--commit TEXT]
-                      [--again-failed] [-- options of darb train...]
+                      [--strategies NAME...] [--seeds N...] [--data DIR] [--darb FILE] [--make-scene FILE]
+                      [--commit TEXT] [--again-failed] [-- options of darb train...]
     real_scale.py page AFTER.json [BEFORE.json] [-o FILE.md]
 
 run   trains SETS x ITERATIONS x STRATEGIES and adds a row a run to DIR/real_scale.json. When the time is over, the run
@@ -14,6 +14,8 @@ page  prints a Markdown table, with two files the rows of both below each other 
 
 --out         runs and results; default: build/real_scale. Finished runs keep their scene and lose their checkpoint.
 --limit       seconds that the whole call may take; default: 540.
+--make-scene  the program that makes still_life_1200 and town_1200 (36 photos), and town_1200_large (225 photos) where
+              that is asked for, in DIR/sets; default: build/make_scene, which the preset lab builds.
 --reduced     the table for a CPU: photos at most PX wide (default 400), 2,000 iterations, adc and budget, three sets.
 --data        the folder of the sets; default: ../shared/data beside the checkout, or DARB_TEST_DATA.
 --darb        the command to run; default: build/darb of this checkout.
@@ -30,13 +32,18 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-SETS = ["fox_800", "castle_p30_1600", "monstree_800", "miku_plush_800", "asclepius_1600"]
+SETS = ["fox_800", "castle_p30_1600", "monstree_800", "miku_plush_800", "asclepius_1600", "still_life_1200",
+        "town_1200"]
+# What make_scene is asked for to make a set with exact truth, photos of 1,200 x 900 px.
+GENERATED = {"still_life_1200": ["FOLDER", "6"], "town_1200": ["town", "FOLDER", "6", "6"],
+             "town_1200_large": ["town", "FOLDER", "15", "6"]}
 ITERATIONS = [1_600, 7_000, 30_000]
 STRATEGIES = ["adc", "budget", "mcmc"]
 REDUCED = {"sets": ["castle_p30_1600", "fox_800", "monstree_800"], "iterations": [2_000],
@@ -139,10 +146,36 @@ class Table:
             name.append(re.sub(r"[^A-Za-z0-9.]+", "_", run["options"]).strip("_"))
         return self.out / "runs" / "-".join(name)
 
+    def data_of(self, name):
+        """The folder of a set; what is generated lies beside the results, unless --data has it."""
+        given = self.args.data / name
+        return self.out / "sets" / name if name in GENERATED and not given.is_dir() else given
+
+    def make(self, name):
+        """Generates a set, which appears once it is whole."""
+        folder = self.data_of(name)
+        if name not in GENERATED or folder.is_dir() or not os.access(self.args.make_scene, os.X_OK):
+            return
+        beside = folder.with_name(name + ".tmp")
+        shutil.rmtree(beside, ignore_errors=True)
+        beside.parent.mkdir(parents=True, exist_ok=True)
+        begun = time.monotonic()
+        words = [str(beside) if word == "FOLDER" else word for word in GENERATED[name]]
+        try:
+            done = subprocess.run([str(self.args.make_scene), *words], capture_output=True, text=True,
+                                  timeout=max(self.left(), 0.1))
+        except subprocess.TimeoutExpired:
+            say(f"{name}: the time was over before its photos were made; a larger --limit makes them")
+            return
+        if done.returncode != 0:
+            fail(f"{self.args.make_scene} {' '.join(words)}: exit code {done.returncode}: {done.stderr.strip()[:300]}")
+        beside.rename(folder)
+        say(f"{name}: made in {time.monotonic() - begun:.0f} s")
+
     def command(self, run, folder):
         if (folder / "checkpoint.darb").exists():
             return [self.args.darb, "train", "--resume", "-o", folder, "-q"]
-        command = [self.args.darb, "train", self.args.data / run["set"], "-o", folder, "--eval", "--no-report", "-q",
+        command = [self.args.darb, "train", self.data_of(run["set"]), "-o", folder, "--eval", "--no-report", "-q",
                    "--iterations", str(run["iterations"]), "--strategy", run["strategy"], "--seed", str(run["seed"])]
         if run["resolution"]:
             command += ["-r", str(run["resolution"])]
@@ -219,9 +252,13 @@ class Table:
         return row is not None and not ("error" in row and self.args.again_failed)
 
     def execute(self):
-        missing = [name for name in self.args.sets if not (self.args.data / name).is_dir()]
+        for name in self.args.sets:
+            if any(run["set"] == name and not self.is_done(run) for run in self.runs()):
+                self.make(name)
+        missing = [name for name in self.args.sets if not self.data_of(name).is_dir()]
         for name in missing:
-            say(f"{name}: skipped, as {self.args.data / name} is not there")
+            why = f", which {self.args.make_scene} would make" if name in GENERATED else ""
+            say(f"{name}: skipped, as {self.data_of(name)} is not there{why}")
         todo = [run for run in self.runs() if run["set"] not in missing and not self.is_done(run)]
         for place, run in enumerate(todo):
             if self.left() < LEAST_SECONDS or not self.do(run):
@@ -319,6 +356,7 @@ def parse(arguments):
     run.add_argument("--data", type=pathlib.Path,
                      default=pathlib.Path(os.environ.get("DARB_TEST_DATA") or ROOT.parent / "shared" / "data"))
     run.add_argument("--darb", type=pathlib.Path, default=ROOT / "build" / "darb")
+    run.add_argument("--make-scene", type=pathlib.Path, default=ROOT / "build" / "make_scene")
     run.add_argument("--commit")
     run.add_argument("--again-failed", action="store_true")
     shown = commands.add_parser("page")
