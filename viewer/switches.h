@@ -19,8 +19,9 @@ inline constexpr int effect_row(int effect) {
 inline constexpr int kPresetRow = kAccuracyCount + EFFECT_COUNT;
 
 inline constexpr std::array kAccuracyRows = {
-    kPresetRow,    int{kEvaluation}, int{kFootprint},  int{kAlphaCutoff}, int{kTransmittanceStop},
-    int{kStorage}, int{kDepthOrder}, int{kRenderScale}};
+    kPresetRow,        int{kEvaluation},        int{kFootprint},
+    int{kAlphaCutoff}, int{kTransmittanceStop}, int{kStorage},
+    int{kDepthOrder},  int{kRenderScale},       int{kSplatProjection}};
 /// Only the effects of a view have a row; for the others the plan has no more than a reason.
 inline constexpr bool has_effect_row(int effect) {
     for (const ProjectionSwitch& s : kProjectionSwitches)

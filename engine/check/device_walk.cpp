@@ -15,6 +15,7 @@ ForwardOptions forward_options(const SplatModel& model, const WalkSettings& sett
     options.polynomial_degree = settings.polynomial_degree;
     options.storage = settings.storage;
     options.depth_order = settings.depth_order;
+    options.projection = settings.projection;
     options.alpha_cutoff = settings.alpha_cutoff;
     options.transmittance_stop = settings.transmittance_stop;
     options.store_for_backward = settings.depth_order != DEPTH_ORDER_PIXEL;

@@ -26,6 +26,7 @@ struct WalkSettings {
     int polynomial_degree = 5;
     int storage = STORAGE_FLOAT32;
     int depth_order = DEPTH_ORDER_CENTRE;  // DEPTH_ORDER_PIXEL: forward only
+    int projection = PROJECTION_JACOBIAN;
     float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
     glm::vec3 background{0.0f};

@@ -31,6 +31,9 @@ constexpr AccuracyChoice kDegrees[] = {{"file", kOfFile}, {"2", 2}, {"1", 1}, {"
 constexpr AccuracyChoice kOrders[] = {{"centre", DEPTH_ORDER_CENTRE},
                                       {"centre16", DEPTH_ORDER_CENTRE16},
                                       {"pixel", DEPTH_ORDER_PIXEL, false}};
+constexpr AccuracyChoice kProjections[] = {{"jacobian", PROJECTION_JACOBIAN},
+                                           {"unscented", PROJECTION_UNSCENTED},
+                                           {"auto", PROJECTION_AUTO}};
 constexpr AccuracyChoice kScales[] = {{"1", 1}, {"1/2", 0.5, false}};
 
 // The presets are choices of index: {fast, balanced, exact}.
@@ -64,6 +67,12 @@ constexpr AccuracySetting kSettings[kAccuracyCount] = {
      kScales,
      {0, 0, 0},
      "Train on smaller photos: -r 2."},
+    {"splat_projection",
+     "jacobian: a splat's shape by the camera's slope at its centre; unscented: by sigma points; "
+     "auto: by these where the slope changes within the splat",
+     kProjections,
+     {0, 0, 0},
+     ""},
 };
 constexpr std::string_view kPresets[kPresetCount] = {"fast", "balanced", "exact"};
 
@@ -182,6 +191,7 @@ void set_options(const Accuracy& accuracy, ForwardOptions& options) {
     options.transmittance_stop = static_cast<float>(accuracy.value(kTransmittanceStop));
     options.storage = static_cast<int>(accuracy.value(kStorage));
     options.depth_order = static_cast<int>(accuracy.value(kDepthOrder));
+    options.projection = static_cast<int>(accuracy.value(kSplatProjection));
 }
 
 FrameAccuracy frame_accuracy(const Accuracy& accuracy, const SplatModel& model) {

@@ -23,6 +23,7 @@ enum AccuracySettingId {
     kShDegree,
     kDepthOrder,
     kRenderScale,
+    kSplatProjection,
     kAccuracyCount
 };
 

@@ -58,6 +58,7 @@ SpecConstants projection_constants(const Device& device, const ForwardOptions& o
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = sh_stored;
+    constants["PROJECTION"] = options.projection;
     add_constants(options.effects, constants);
     return constants;
 }

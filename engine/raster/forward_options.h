@@ -73,6 +73,7 @@ struct ForwardOptions {
     float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
     int storage = STORAGE_FLOAT32;         // how projected splats are stored
     int depth_order = DEPTH_ORDER_CENTRE;  // DEPTH_ORDER_PIXEL: forward only
+    int projection = PROJECTION_JACOBIAN;  // PROJECTION_*
     ProjectionEffects effects;
     bool store_for_backward = false;
     bool backward_follows = true;  // false: what is stored is looked at, without a backward pass

@@ -107,6 +107,7 @@ DepthReading usual_reading(int kernel) {
 
 DepthPlanes::DepthPlanes(Device& device, const ForwardOptions& options) : device_(&device) {
     SpecConstants plane = kernel_constants(device, options);
+    plane["PROJECTION"] = options.projection;
     add_constants(options.effects, plane);
     plane = for_several_passes(std::move(plane));
     plane["THREADS"] = SPLAT_GROUP;

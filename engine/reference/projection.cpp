@@ -9,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/reference/reference_lens.h"
+#include "engine/reference/reference_sigma_points.h"
 #include "engine/scene/pose_metric.h"
 #include "shaders/shared/lens.h"
 
@@ -129,6 +130,13 @@ RowGradients<T> row_gradients(const Splats<T>& splats, const CovarianceTerms<T>&
     return d;
 }
 
+/// dL/d(A, B, C) from the gradients of rows that are a triangular factor of the covariance.
+template <class T>
+Vec3<T> covariance_backward(const CovarianceTerms<T>& terms, const RowGradients<T>& d) {
+    const T d_b = d.d_r1.y / terms.r2.y;
+    return {(d.d_r1.x - d_b * terms.r2.x) / (2 * terms.r1.x), d_b, d.d_r2.y / (2 * terms.r2.y)};
+}
+
 /// dL/d(mean in the camera) through the entries of the Jacobian, clamp included.
 template <class T>
 Vec3<T> jacobian_backward(const Vec3<T>& mean, const CovarianceTerms<T>& terms,
@@ -224,14 +232,14 @@ struct ShutterGradients {
 
 template <class T>
 ShutterGradients<T> shutter_backward(const CovarianceTerms<T>& terms, const RowCamera<T>& row,
-                                     const Vec3<T>& d_j1, const Vec3<T>& d_j2) {
+                                     const Vec3<T>& d_j1, const Vec3<T>& d_j2,
+                                     const SigmaGradients<T>& by_sigma) {
     const RowMotion<T>& m = terms.motion;
     // j1 = own1 + u s own2, j2 = own2 + v s own2, with (u, v) = own . velocity, s = 1 / (H - v).
-    const T by_u = m.per_row * glm::dot(d_j1, terms.own2);
-    const T by_v =
-        m.per_row * glm::dot(d_j2, terms.own2) +
-        m.per_row * m.per_row *
-            (m.pixel.x * glm::dot(d_j1, terms.own2) + m.pixel.y * glm::dot(d_j2, terms.own2));
+    const Vec2<T> d_shear =
+        Vec2<T>(glm::dot(d_j1, terms.own2), glm::dot(d_j2, terms.own2)) + by_sigma.d_shear;
+    const T by_u = m.per_row * d_shear.x;
+    const T by_v = m.per_row * d_shear.y + m.per_row * m.per_row * glm::dot(m.pixel, d_shear);
     ShutterGradients<T> d;
     d.d_own1 = d_j1 + by_u * m.velocity;
     d.d_own2 = d_j2 + m.per_row * (m.pixel.x * d_j1 + m.pixel.y * d_j2) + by_v * m.velocity;
@@ -241,6 +249,8 @@ ShutterGradients<T> shutter_backward(const CovarianceTerms<T>& terms, const RowC
     d.d_time = -glm::dot(d.d_velocity, glm::cross(row.turn, row.swing)) -
                glm::dot(d_j1, glm::cross(row.turn, terms.j1)) -
                glm::dot(d_j2, glm::cross(row.turn, terms.j2));
+    for (int k = 0; k < 3; ++k)
+        d.d_time += glm::dot(by_sigma.d_axis[k], glm::cross(row.turn, terms.sigma.axis[k]));
     return d;
 }
 
@@ -316,8 +326,7 @@ void SplatGradients<T>::resize_like(const Splats<T>& splats) {
 
 /// Covariance, its Cholesky factor and the slope of the depth along it.
 template <class T>
-void set_shape(const Camera& camera, const RenderSettings& settings,
-               const RotationTerms<T>& rotation, const CovarianceTerms<T>& terms,
+void set_shape(const RenderSettings& settings, const CovarianceTerms<T>& terms,
                ProjectedSplat<T>& p) {
     const T area = terms.shrink * terms.shrink;  // scale of det after shrinking, per px^2
     p.cov_xx = glm::dot(terms.r1, terms.r1) + T(settings.low_pass);
@@ -327,8 +336,7 @@ void set_shape(const Camera& camera, const RenderSettings& settings,
     p.l11 = terms.shrink * std::sqrt(yy / terms.det);
     p.l21 = -terms.shrink * xy / (std::sqrt(yy) * std::sqrt(terms.det));
     p.l22 = 1 / std::sqrt(p.cov_yy);
-    const Vec3<T> r3 =
-        terms.root * (Vec3<T>(0, 0, 1) * view_rotation<T>(camera) * rotation.matrix) * terms.scale;
+    const Vec3<T>& r3 = terms.r3;
     const T c1 = glm::dot(r3, terms.r1), c2 = glm::dot(r3, terms.r2);
     p.depth_slope = {p.l11 * c1 + p.l21 * c2, p.l22 * c2};
     const Vec3<T> n1 = terms.r1 * terms.shrink, n2 = terms.r2 * terms.shrink;
@@ -360,10 +368,9 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& g
         p.cull = Cull::rotation;
         return p;
     }
-    const CovarianceTerms<T> terms =
-        covariance_terms(mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index),
-                         row, settings.low_pass,
-                         kernel.covariance_scale(static_cast<double>(exponent_of(splats, index))));
+    const CovarianceTerms<T> terms = covariance_terms(
+        mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index), row, settings,
+        kernel.covariance_scale(static_cast<double>(exponent_of(splats, index))));
     p.exponent = exponent_of(splats, index);
     p.opacity = sigmoid_of_clamped(splats.opacity_logit[index]) * opacity_factor(splats, terms);
     const bool half = settings.storage == STORAGE_FLOAT16;
@@ -390,8 +397,9 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& g
         p.mean_px = {T(camera.fx) * at.value.x + T(camera.cx),
                      T(camera.fy) * at.value.y + T(camera.cy)};
     }
+    p.mean_px += terms.sigma.shift;
     p.depth = mean.z;
-    set_shape(camera, settings, rotation, terms, p);
+    set_shape(settings, terms, p);
     p.reach = T(kernel.reach(static_cast<double>(p.opacity), settings.alpha_cutoff,
                              static_cast<double>(p.exponent)));
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
@@ -419,25 +427,37 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& given
     const Vec3<T> mean = mean_in_camera(&splats.position[index * 3], camera);
     const RotationTerms<T> rotation = rotation_terms(&splats.rotation[index * 4]);
     const CovarianceTerms<T> terms = covariance_terms(
-        mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index), row,
-        settings.low_pass, kernel.covariance_scale(static_cast<double>(splat.exponent)));
+        mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index), row, settings,
+        kernel.covariance_scale(static_cast<double>(splat.exponent)));
     const Mat3<T> view_matrix = view_rotation<T>(camera);
 
     // r1 = root (k1 R) diag(scale), r2 alike.
-    const RowGradients<T> d_rows = row_gradients(splats, terms, splat, gradient);
+    RowGradients<T> d_rows = row_gradients(splats, terms, splat, gradient);
+    SigmaGradients<T> by_sigma;
+    if (terms.sigma.used) {  // nothing of the shape goes through the Jacobian
+        by_sigma = sigma_backward(mean, terms.sigma, camera, covariance_backward(terms, d_rows),
+                                  gradient.d_mean_px);
+        d_rows = {};
+    }
     const Vec3<T> e1 = terms.root * d_rows.d_r1, e2 = terms.root * d_rows.d_r2;
-    const Vec3<T> d_scale = (terms.k1 * rotation.matrix) * e1 + (terms.k2 * rotation.matrix) * e2;
-    const Mat3<T> d_matrix = glm::outerProduct(terms.k1, e1 * terms.scale) +
-                             glm::outerProduct(terms.k2, e2 * terms.scale);
+    Vec3<T> d_scale = (terms.k1 * rotation.matrix) * e1 + (terms.k2 * rotation.matrix) * e2;
+    Mat3<T> d_matrix = glm::outerProduct(terms.k1, e1 * terms.scale) +
+                       glm::outerProduct(terms.k2, e2 * terms.scale);
+    for (int k = 0; k < 3; ++k) {
+        const Vec3<T> d_axis = by_sigma.d_axis[k] * view_matrix;
+        d_scale[k] += terms.root * glm::dot(d_axis, rotation.matrix[k]);
+        d_matrix[k] += terms.root * terms.scale[k] * d_axis;
+    }
     const Vec4<T> d_rotation = rotation_backward(rotation, d_matrix);
     const Vec3<T> d_k1 = rotation.matrix * (e1 * terms.scale);
     const Vec3<T> d_k2 = rotation.matrix * (e2 * terms.scale);
     const Vec3<T> d_j1 = view_matrix * d_k1, d_j2 = view_matrix * d_k2;
 
-    const ShutterGradients<T> d =
-        row.rolls ? shutter_backward(terms, row, d_j1, d_j2) : ShutterGradients<T>{d_j1, d_j2};
+    const ShutterGradients<T> d = row.rolls ? shutter_backward(terms, row, d_j1, d_j2, by_sigma)
+                                            : ShutterGradients<T>{d_j1, d_j2};
     Vec3<T> d_mean =
         mean_backward(mean, terms, camera, d.d_own1, d.d_own2, gradient.d_mean_px) + d.d_mean;
+    d_mean += by_sigma.d_mean;
     d_mean.z += gradient.d_depth;
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
     const Vec3<T> d_view =
@@ -454,12 +474,17 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& given
         *d_camera = camera_backward({mean, position, d_mean, d.d_own1, d.d_own2, d_k1, d_k2, d_view,
                                      gradient.d_mean_px + Vec2<T>(0, by_row)},
                                     terms, camera);
+        d_camera->d_focal += by_sigma.d_focal;
+        for (int k = 0; k < 3; ++k)
+            d_camera->d_rotation += glm::outerProduct(
+                by_sigma.d_axis[k], terms.root * terms.scale[k] * rotation.matrix[k]);
         const Mat3<T> back(glm::transpose(row.turned));
         d_camera->d_rotation = back * d_camera->d_rotation;
         d_camera->d_translation = back * d_camera->d_translation;
         // A turn of the row's camera on the left, and the shutter's terms in the velocity.
-        const Vec3<T> twist = glm::cross(mean, d_mean) + glm::cross(d_j1, terms.j1) +
-                              glm::cross(d_j2, terms.j2) - glm::cross(row.swing, d.d_velocity);
+        Vec3<T> twist = glm::cross(mean, d_mean) + glm::cross(d_j1, terms.j1) +
+                        glm::cross(d_j2, terms.j2) - glm::cross(row.swing, d.d_velocity);
+        for (int k = 0; k < 3; ++k) twist += glm::cross(terms.sigma.axis[k], by_sigma.d_axis[k]);
         const Mat3<T> jacobian(left_jacobian(double(row.time) * glm::dvec3(row.turn)));
         d_camera->d_turn =
             row.time * (glm::transpose(jacobian) * twist) + glm::cross(mean, d.d_velocity);
@@ -583,7 +608,6 @@ T row_shrink(const Vec3<T>& r1, const Vec3<T>& r2) {
     return longest > T(ROW_LIMIT) ? std::ldexp(T(1), -std::ilogb(longest)) : T(1);
 }
 
-/// The pixel of a point in the camera, whether or not the lens sees it.
 template <class T>
 Vec2<T> pixel_at(const Vec3<T>& mean, const Camera& camera) {
     const Vec2<T> ray(mean.x / mean.z, mean.y / mean.z);
@@ -638,10 +662,23 @@ RowCamera<T> row_camera(const T* position, const Camera& camera) {
     }
 }
 
+/// The triangular factor of the points' covariance with the depth.
+template <class T>
+void set_rows_of_points(CovarianceTerms<T>& c) {
+    const SigmaTerms<T>& s = c.sigma;
+    const auto root = [](T square) { return std::sqrt(std::max(square, T(0))); };
+    c.r1 = {root(s.xx), 0, 0};
+    c.r2 = {s.xy / c.r1.x, 0, 0};
+    c.r2.y = root(s.yy - c.r2.x * c.r2.x);
+    c.r3 = {s.xz / c.r1.x, 0, 0};
+    c.r3.y = (s.yz - c.r2.x * c.r3.x) / c.r2.y;
+    c.r3.z = root(s.zz - c.r3.x * c.r3.x - c.r3.y * c.r3.y);
+}
+
 template <class T>
 CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
                                     const T* log_scale, T filter, const RowCamera<T>& row,
-                                    double low_pass, double covariance_scale) {
+                                    const RenderSettings& settings, double covariance_scale) {
     CovarianceTerms<T> c;
     const Camera& camera = row.camera;
     set_rows(mean_camera, camera, c);
@@ -660,27 +697,34 @@ CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTe
     c.root = T(std::sqrt(covariance_scale));
     c.r1 = c.root * (c.k1 * rotation.matrix) * c.scale;
     c.r2 = c.root * (c.k2 * rotation.matrix) * c.scale;
+    c.r3 = c.root * (Vec3<T>(0, 0, 1) * view * rotation.matrix) * c.scale;
+    std::array<Vec3<T>, 3> axis;
+    for (int k = 0; k < 3; ++k) axis[k] = c.root * c.scale[k] * (view * rotation.matrix[k]);
+    c.sigma = sigma_terms(mean_camera, axis, c, camera, settings.projection);
+    if (c.sigma.used) set_rows_of_points(c);
     c.shrink = row_shrink(c.r1, c.r2);
     const Vec3<T> r1 = c.r1 * c.shrink, r2 = c.r2 * c.shrink, cross = glm::cross(r1, r2);
-    const T h = T(low_pass) * c.shrink * c.shrink;
+    const T h = T(settings.low_pass) * c.shrink * c.shrink;
     c.det_sharp = glm::dot(cross, cross);
     // det(M M^T + h I) without the cancellation of A C - B^2 (Lagrange's identity).
     c.det = c.det_sharp + h * (glm::dot(r1, r1) + glm::dot(r2, r2)) + h * h;
     return c;
 }
 
-#define DARB_INSTANTIATE(T)                                                                \
-    template RotationTerms<T> rotation_terms(const T*);                                    \
-    template Vec4<T> rotation_backward(const RotationTerms<T>&, const Mat3<T>&);           \
-    template RatioTerms<T> ratio_terms(const Vec3<T>&, const Camera&);                     \
-    template T clamped_scale(T);                                                           \
-    template SmoothedScale<T> smoothed_scale(const T*, T);                                 \
-    template Mat3<T> view_rotation(const Camera&);                                         \
-    template Vec3<T> mean_in_camera(const T*, const Camera&);                              \
-    template RowCamera<T> row_camera(const T*, const Camera&);                             \
-    template CovarianceTerms<T> covariance_terms(const Vec3<T>&, const RotationTerms<T>&,  \
-                                                 const T*, T, const RowCamera<T>&, double, \
-                                                 double);
+#define DARB_INSTANTIATE(T)                                                               \
+    template RotationTerms<T> rotation_terms(const T*);                                   \
+    template Vec4<T> rotation_backward(const RotationTerms<T>&, const Mat3<T>&);          \
+    template RatioTerms<T> ratio_terms(const Vec3<T>&, const Camera&);                    \
+    template T clamped_scale(T);                                                          \
+    template SmoothedScale<T> smoothed_scale(const T*, T);                                \
+    template Mat3<T> view_rotation(const Camera&);                                        \
+    template Vec3<T> mean_in_camera(const T*, const Camera&);                             \
+    template RowCamera<T> row_camera(const T*, const Camera&);                            \
+    template CovarianceTerms<T> covariance_terms(const Vec3<T>&, const RotationTerms<T>&, \
+                                                 const T*, T, const RowCamera<T>&,        \
+                                                 const RenderSettings&, double);          \
+    template Vec2<T> pixel_at(const Vec3<T>&, const Camera&);                             \
+    template void set_rows(const Vec3<T>&, const Camera&, CovarianceTerms<T>&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 #undef DARB_INSTANTIATE

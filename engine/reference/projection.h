@@ -154,6 +154,18 @@ struct RowMotion {
     T per_row = 0;        // the time by the row, 1/px; 0 where it is held
 };
 
+/// The sigma points of a splat, see reference_sigma_points.h. The default is a splat without.
+template <class T>
+struct SigmaTerms {
+    bool used = false;
+    std::array<Vec3<T>, 3> axis{};    // one standard deviation each, in the camera
+    std::array<Vec2<T>, 6> offset{};  // px from the centre's pixel, of one moment
+    Vec2<T> shear{0};                 // that the shutter adds to an offset, by its y
+    Vec2<T> shift{0};                 // px, of the mean
+    T xx = 0, xy = 0, yy = 0;         // covariance, px^2
+    T xz = 0, yz = 0, zz = 0;         // with the depth, and its own
+};
+
 template <class T>
 struct CovarianceTerms {
     RatioTerms<T> ratio;
@@ -162,12 +174,15 @@ struct CovarianceTerms {
     Vec3<T> j1{0}, j2{0};  // those with the row's time free, J; px per world unit
     Vec3<T> k1{0}, k2{0};  // rows of J W
     SmoothedScale<T> smooth;
-    Vec3<T> scale{0};      // standard deviations, filter included, world units
-    T root = 1;            // sqrt of the footprint's covariance scale
-    Vec3<T> r1{0}, r2{0};  // rows of M = root J W R diag(scale), px
-    T shrink = 1;          // power of two that brings rows beyond ROW_LIMIT below 2 px
-    T det_sharp = 0;       // |r1 x r2|^2: determinant before the low-pass, px^4 times shrink^4
-    T det = 0;             // det S', px^4 times shrink^4
+    Vec3<T> scale{0};  // standard deviations, filter included, world units
+    T root = 1;        // sqrt of the footprint's covariance scale
+    SigmaTerms<T> sigma;
+    // Rows of M = root J W R diag(scale), px, and that of the depth. With sigma points, of the
+    // lower triangular factor of their covariance.
+    Vec3<T> r1{0}, r2{0}, r3{0};
+    T shrink = 1;     // power of two that brings rows beyond ROW_LIMIT below 2 px
+    T det_sharp = 0;  // |r1 x r2|^2: determinant before the low-pass, px^4 times shrink^4
+    T det = 0;        // det S', px^4 times shrink^4
 };
 
 template <class T>
@@ -181,7 +196,14 @@ Vec3<T> mean_in_camera(const T* position, const Camera& camera);
 template <class T>
 CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
                                     const T* log_scale, T filter, const RowCamera<T>& row,
-                                    double low_pass, double covariance_scale);
+                                    const RenderSettings& settings, double covariance_scale);
+
+/// The pixel of a point in the camera, whether or not the lens sees it.
+template <class T>
+Vec2<T> pixel_at(const Vec3<T>& mean, const Camera& camera);
+/// Sets ratio, own1 and own2 for a point in the camera.
+template <class T>
+void set_rows(const Vec3<T>& mean_camera, const Camera& camera, CovarianceTerms<T>& c);
 
 // Real spherical harmonics of degree 0 to 3 in the order and with the signs of 3DGS: the basis and
 // its derivative with respect to the direction.

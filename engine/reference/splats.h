@@ -64,6 +64,7 @@ struct RenderSettings {
     int storage = STORAGE_FLOAT32;  // STORAGE_FLOAT16 rounds what the device stores as halves, and
                                     // takes the rounding as the identity on the way back
     int depth_order = DEPTH_ORDER_CENTRE;
+    int projection = PROJECTION_JACOBIAN;
     size_t depth_window = 0;  // for DEPTH_ORDER_PIXEL; 0: a full sort at every pixel
     int sh_degree = 3;        // active degree; that of the model where it is lower
     int threads = 0;          // 0: one per core. The result does not depend on it.

@@ -37,6 +37,16 @@ void store_camera_gradient(CameraData camera, uint i, vec3 p, vec3 to_splat, vec
         for (uint c = CAMERA_SHARE_SHUTTER; c < CAMERA_SHARES; ++c) camera_gradient[at + c] = 0.0;
 }
 
+// What reaches the camera through sigma points. axes: the splat's, in the world, each as long as its standard deviation.
+void add_sigma_camera_gradient(uint i, mat3 axes, SigmaGradient g) {
+    const uint at = CAMERA_SHARES * i;
+    const mat3 by_row = axes * transpose(g.d_axes);  // column: row of the rotation
+    for (uint k = 0u; k < 3u; ++k)
+        for (uint c = 0u; c < 3u; ++c) camera_gradient[at + 3u * k + c] += by_row[k][c];
+    camera_gradient[at + 9u] += g.d_focal.x;
+    camera_gradient[at + 10u] += g.d_focal.y;
+}
+
 // twist: dL/d(a turn of the row's camera, on the left).
 void store_shutter_gradient(CameraData camera, uint i, float time, vec3 p, vec3 d_p, vec3 twist, vec3 d_view,
                             ShutterMotion m, ShutterGradient g) {

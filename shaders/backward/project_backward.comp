@@ -11,6 +11,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
+#include "shared/accuracy_list.h"
 #include "shared/attribute_list.h"
 #include "shared/limits.h"
 #include "shared/optim_args.h"
@@ -74,6 +75,7 @@ layout(set = 0, binding = FRAME_BINDING + 12, scalar) readonly buffer PartialExp
 #include "lib/depth_sum.glsl"
 #include "effects/antialias.glsl"
 #include "effects/camera_model.glsl"
+#include "effects/sigma_points.glsl"
 #include "effects/shutter.glsl"
 #include "lib/linear_id.glsl"
 #include "lib/partials.glsl"

@@ -91,12 +91,27 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     }
     const mat3 axes = rotation_matrix(unit);
     const vec3 t0 = to_world(camera, j0), t1 = to_world(camera, j1);
-    const vec3 r1 = (t0 * axes) * s, r2 = (t1 * axes) * s;
+    vec3 r1 = (t0 * axes) * s, r2 = (t1 * axes) * s;
+    SigmaPoints points;
+    if (PROJECTION != PROJECTION_JACOBIAN) {
+        const vec2 shear = SHUTTER == 1 ? motion.per_row * motion.pixel : vec2(0.0);
+        points = sigma_points(camera, p, axes, s, k, shear);
+        if (points.used) {
+            r1 = points.r1;
+            r2 = points.r2;
+        }
+    }
     vec3 d_r1, d_r2, d_log_scale;
     const float logit = opacity_logit[i];
     const float o = LINEAR_VALUES == 1 ? logit : 1.0 / (1.0 + exp(-logit)), rest = 1.0 / (1.0 + exp(logit));
     const Factor f = cholesky_factor(r1, r2, args.low_pass);
     factor_gradient(f, sums, r1, r2, o * kept, d_r1, d_r2, d_log_scale, g.mean);
+    SigmaGradient by_sigma = no_sigma_gradient();
+    if (PROJECTION != PROJECTION_JACOBIAN && points.used) {  // nothing of the shape goes through the Jacobian
+        by_sigma = sigma_gradient(camera, p, points, d_r1, d_r2, g.mean);
+        d_log_scale = by_sigma.d_log_scale;
+        d_r1 = d_r2 = vec3(0.0);
+    }
     g.shape = 0.0;
     if (SHAPED) g.shape = by_shape * (sums.d_exponent + shaped_length_slope(exponent) *
                                       (d_log_scale.x + d_log_scale.y + d_log_scale.z));
@@ -109,19 +124,25 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     else
         g.log_scale = outside_is_zero(d_log_scale, raw_scale, LOG_SCALE_LIMIT);
     const vec3 e1 = d_r1 * s, e2 = d_r2 * s;
-    const mat3 d_axes = mat3(e1.x * t0 + e2.x * t1, e1.y * t0 + e2.y * t1, e1.z * t0 + e2.z * t1);
+    mat3 d_axes = mat3(e1.x * t0 + e2.x * t1, e1.y * t0 + e2.y * t1, e1.z * t0 + e2.z * t1);
+    if (PROJECTION != PROJECTION_JACOBIAN)
+        for (int c = 0; c < 3; ++c) d_axes[c] += to_world(camera, by_sigma.d_axes[c]) * s[c];
     const vec4 d_unit = quaternion_gradient(unit, d_axes);
     g.rotation = (d_unit - unit * dot(unit, d_unit)) / norm;
 
     const vec3 d_j0 = to_camera(camera, axes * e1), d_j1 = to_camera(camera, axes * e2);
     ShutterGradient by_shutter;
     vec3 d_p = SHUTTER == 1 ? shutter_point_gradient(camera, motion, p, k, mat2x3(j0, j1), mat2x3(d_j0, d_j1), g.mean,
-                                                     by_shutter)
+                                                     by_sigma.d_shear, by_shutter)
                             : camera_point_gradient(camera, p, d_j0, d_j1, g.mean);
+    if (PROJECTION != PROJECTION_JACOBIAN) d_p += by_sigma.d_p;
     if (DEPTH_SUM == 1) d_p.z += sums.d_depth;
-    if (CAMERA_GRADIENT == 1 && SHUTTER == 0)
+    const mat3 long_axes = mat3(axes[0] * s.x, axes[1] * s.y, axes[2] * s.z);
+    if (CAMERA_GRADIENT == 1 && SHUTTER == 0) {
         store_camera_gradient(camera, i, p, to_splat, d_p, mat2x3(j0, j1), mat2x3(axes * e1, axes * e2),
                               mat2x3(d_j0, d_j1), g.mean);
+        if (PROJECTION != PROJECTION_JACOBIAN) add_sigma_camera_gradient(i, long_axes, by_sigma);
+    }
     g.position = to_world(camera, d_p);
     if (LINEAR_VALUES == 1)
         g.opacity_logit = sums.d_opacity * kept;
@@ -151,6 +172,9 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
         g.position += d_view;
     }
     if (SHUTTER == 1) {  // the time of the row moves with the splat
+        if (PROJECTION != PROJECTION_JACOBIAN && points.used)
+            for (int c = 0; c < 3; ++c)
+                by_shutter.d_time += dot(by_sigma.d_axes[c], cross(camera.shutter_turn, points.axes[c]));
         const float d_time = by_shutter.d_time + dot(d_p, motion.velocity) -
                              dot(d_view, to_world(camera, motion.swing));
         const float by_row = d_time * motion.per_row;
@@ -159,11 +183,14 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
         if (CAMERA_GRADIENT == 1) {
             const vec2 shear = motion.per_row * motion.pixel;
             const mat2x3 d_t = mat2x3(axes * e1, axes * (e2 + shear.x * e1 + shear.y * e2));
-            const vec3 twist = cross(p, d_p) + cross(d_j0, j0) + cross(d_j1, j1);
+            vec3 twist = cross(p, d_p) + cross(d_j0, j0) + cross(d_j1, j1);
+            if (PROJECTION != PROJECTION_JACOBIAN && points.used)
+                for (int c = 0; c < 3; ++c) twist += cross(points.axes[c], by_sigma.d_axes[c]);
             store_shutter_gradient(camera, i, time, p, d_p, twist, d_view, motion, by_shutter);
             camera.centre_rest = centre_rest;
             store_camera_gradient(camera, i, p, from_centre(camera, position[i]), d_p, k, d_t, by_shutter.d_k,
                                   g.mean + vec2(0.0, by_row));
+            if (PROJECTION != PROJECTION_JACOBIAN) add_sigma_camera_gradient(i, long_axes, by_sigma);
             turn_back_camera_gradient(camera, i, time, d_view);
         }
     }

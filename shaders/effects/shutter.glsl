@@ -75,10 +75,13 @@ struct ShutterGradient {
 };
 
 // dL/dp at a held time, from the gradients of the pixel and of the Jacobian's rows. j: these rows after add_shutter; k:
-// before it.
+// before it. d_shear: of the
+// offsets of sigma points.
 vec3 shutter_point_gradient(CameraData camera, ShutterMotion m, vec3 p, mat2x3 k, mat2x3 j, mat2x3 d_j, vec2 d_pixel,
-                            out ShutterGradient g) {
-    const vec2 along = vec2(dot(d_j[0], k[1]), dot(d_j[1], k[1])), shear = m.per_row * m.pixel;
+                            vec2 d_shear, out ShutterGradient g) {
+    vec2 along = vec2(dot(d_j[0], k[1]), dot(d_j[1], k[1]));
+    const vec2 shear = m.per_row * m.pixel;
+    if (PROJECTION != PROJECTION_JACOBIAN) along += d_shear;
     const vec2 d_speed = m.per_row * (along + vec2(0.0, dot(shear, along)));
     g.d_velocity = d_speed.x * k[0] + d_speed.y * k[1];
     g.d_k = mat2x3(d_j[0] + d_speed.x * m.velocity,

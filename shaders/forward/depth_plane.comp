@@ -11,6 +11,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
+#include "shared/accuracy_list.h"
 #include "shared/attribute_list.h"
 #include "shared/depth_args.h"
 #include "shared/limits.h"
@@ -26,6 +27,7 @@ layout(constant_id = 0) const uint THREADS = 64;
 #include "lib/covariance.glsl"
 #include "effects/antialias.glsl"
 #include "effects/camera_model.glsl"
+#include "effects/sigma_points.glsl"
 
 layout(push_constant, scalar) uniform Push { DepthPlaneArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
@@ -55,8 +57,16 @@ void main() {
     vec3 j0, j1;
     jacobian_rows(camera, p, j0, j1);
     const mat3 axes = rotation_matrix(unit);
-    const vec3 r1 = (to_world(camera, j0) * axes) * s, r2 = (to_world(camera, j1) * axes) * s;
-    const vec3 r3 = (camera.row2 * axes) * s;
+    vec3 r1 = (to_world(camera, j0) * axes) * s, r2 = (to_world(camera, j1) * axes) * s;
+    vec3 r3 = (camera.row2 * axes) * s;
+    if (PROJECTION != PROJECTION_JACOBIAN) {
+        const SigmaPoints points = sigma_points(camera, p, axes, s, mat2x3(j0, j1), vec2(0.0));
+        if (points.used) {
+            r1 = points.r1;
+            r2 = points.r2;
+            r3 = points.r3;
+        }
+    }
     const Factor f = cholesky_factor(r1, r2, args.low_pass);
     const vec2 c = vec2(dot(r3, r1), dot(r3, r2));
     const vec2 slope = vec2(f.l11 * c.x + f.l21 * c.y, f.l22 * c.y);

@@ -8,6 +8,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_ballot : require
 
+#include "shared/accuracy_list.h"
 #include "shared/attribute_list.h"
 #include "shared/limits.h"
 #include "shared/render_args.h"
@@ -27,6 +28,7 @@ layout(constant_id = 2) const int SH_STORED = 0;   // degree of the buffer's lay
 #include "lib/depth.glsl"
 #include "effects/antialias.glsl"
 #include "effects/camera_model.glsl"
+#include "effects/sigma_points.glsl"
 #include "effects/shutter.glsl"
 
 #define FRAME_BINDING (1 + ATTRIBUTES)
@@ -153,10 +155,27 @@ uint project(uint i, out int reason) {
     s *= sqrt(kernel_covariance_scale(exponent));
     vec3 j0, j1;
     jacobian_rows(camera, p, j0, j1);
-    if (SHUTTER == 1) add_shutter(shutter_motion(camera, time, p, j0, j1), j0, j1);
+    const mat2x3 moment = mat2x3(j0, j1);
+    vec2 shear = vec2(0.0), shift = vec2(0.0);
+    if (SHUTTER == 1) {
+        const ShutterMotion motion = shutter_motion(camera, time, p, j0, j1);
+        shear = motion.per_row * motion.pixel;
+        add_shutter(motion, j0, j1);
+    }
     const mat3 axes = rotation_matrix(unit);
-    const vec3 r1 = (to_world(camera, j0) * axes) * s;
-    const vec3 r2 = (to_world(camera, j1) * axes) * s;
+    vec3 r1 = (to_world(camera, j0) * axes) * s;
+    vec3 r2 = (to_world(camera, j1) * axes) * s;
+    vec3 r3 = vec3(0.0);  // of the depth
+    if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) r3 = (camera.row2 * axes) * s;
+    if (PROJECTION != PROJECTION_JACOBIAN) {
+        const SigmaPoints points = sigma_points(camera, p, axes, s, moment, shear);
+        if (points.used) {
+            r1 = points.r1;
+            r2 = points.r2;
+            r3 = points.r3;
+            shift = points.shift;
+        }
+    }
     const Factor f = cholesky_factor(r1, r2, args.low_pass);
     const float unit_area = f.shrink * f.shrink;
     if (!is_finite(f.determinant) || any_nan(raw_scale)) return 0u;
@@ -171,6 +190,7 @@ uint project(uint i, out int reason) {
     reason = CULL_OUTSIDE;
     vec2 mean;
     if (!pixel_of(camera, p, mean)) return 0u;
+    if (PROJECTION != PROJECTION_JACOBIAN) mean += shift;
     TileCover c;
     const uint count = find_cover(camera, mean, f, reach, c);
     if (count == 0u) return 0u;
@@ -180,7 +200,7 @@ uint project(uint i, out int reason) {
     if (any_nan(signed_colour) || !magnitude_below(colour, 1e30)) return 0u;
 
     float slope = 0.0;
-    if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) slope = depth_slope(f, r1, r2, (camera.row2 * axes) * s);
+    if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) slope = depth_slope(f, r1, r2, r3);
     store_splat(i, mean, f, colour, opacity);
     splat_bound[i] = vec4(f.l22, reach, p.z, slope);
     if (SHAPED) splat_exponent[i] = exponent;

@@ -20,4 +20,15 @@
     11  // float bits dropped: 4,096 keys per octave, 16 octaves from the near plane
 #define DEPTH_WINDOW 4u  // splats that a pixel holds back to sort
 
+// How a splat's shape reaches the picture: by the Jacobian of the camera at its centre; by sigma
+// points, each through the camera; or by sigma points where the Jacobian changes by more than
+// PROJECTION_SHARE of itself along the splat's longest standard deviation.
+#define PROJECTION_JACOBIAN 0
+#define PROJECTION_UNSCENTED 1
+#define PROJECTION_AUTO 2
+#define PROJECTION_SHARE 0.05
+// A splat has sigma points only where each is farther from the camera's plane than this share of
+// the depth of the centre.
+#define SIGMA_NEAREST 0.5
+
 #endif

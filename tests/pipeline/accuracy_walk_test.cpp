@@ -54,6 +54,7 @@ reference::RenderSettings reference_settings(const ForwardOptions& options) {
     raster.transmittance_stop = options.transmittance_stop;
     raster.storage = options.storage;
     raster.depth_order = options.depth_order;
+    raster.projection = options.projection;
     raster.depth_window = DEPTH_WINDOW;
     return raster;
 }
@@ -80,6 +81,7 @@ TEST_P(EveryChoice, matches_the_double_reference_at_the_same_settings) {
     settings.polynomial_degree = o.polynomial_degree;
     settings.storage = o.storage;
     settings.depth_order = o.depth_order;
+    settings.projection = o.projection;
     settings.alpha_cutoff = o.alpha_cutoff;
     settings.transmittance_stop = o.transmittance_stop;
     Image<double> weights;

@@ -23,10 +23,11 @@ namespace fs = std::filesystem;
 
 struct Constants {
     int degree = 0, off_centre = 0, antialias = 0, smoothing = 0, lens = 0, near_care = 0;
+    int projection = 0;
     /// As spirv-opt takes them: id:value.
     std::string values() const {
-        return fmt::format("1:{0} 2:{0} 200:{1} 201:{2} 202:{3} 203:{4} 204:{5}", degree,
-                           off_centre, antialias, smoothing, lens, near_care);
+        return fmt::format("1:{0} 2:{0} 200:{1} 201:{2} 202:{3} 203:{4} 204:{5} 206:{6}", degree,
+                           off_centre, antialias, smoothing, lens, near_care, projection);
     }
 };
 
@@ -148,6 +149,9 @@ TEST_P(EffectSpirv, every_effect_that_computes_adds_instructions) {
     EXPECT_GT(with({.smoothing = 1}).instructions, none.instructions);
     EXPECT_GT(with({.off_centre = 1, .lens = 1}).instructions, none.instructions);
     EXPECT_GT(with({.near_care = 1}).instructions, none.instructions);
+    const Left points = with({.projection = 1}), by_flag = with({.projection = 2});
+    EXPECT_GT(points.instructions, none.instructions);
+    EXPECT_GT(by_flag.instructions, points.instructions);
     const Left all = with({3, 1, 1, 1, 1, 1});
     EXPECT_GT(all.instructions, none.instructions * 5 / 4);
 }

@@ -32,7 +32,7 @@ OTHER = {
     "kernel": "raised_cosine", "strategy": "mcmc", "start": "random", "effects": "-lens",
     "antialiasing": True, "refine_cameras": "on", "evaluation": "polynomial4",
     "footprint": "exact", "alpha_cutoff": "1/1024", "transmittance_stop": "1e-6",
-    "storage": "float16", "depth_order": "centre16", "iterations": 6, "batch": 2, "seed": 7,
+    "storage": "float16", "depth_order": "centre16", "splat_projection": "auto", "iterations": 6, "batch": 2, "seed": 7,
     "max_splats": 900, "max_memory": "1.5GB", "sh_degree": 1, "depth_weight": 0.25,
     "surface_from": 0.25, "distortion_weight": 0.5, "flatness_weight": 0.5,
     "camera_lr": 0.5, "camera_from": 0.25, "camera_anchor": 0.5, "exposure_grid": True,

@@ -18,17 +18,21 @@ std::vector<float> filters_for(const SplatModel& model, bool on) {
 }
 
 /// Both directions of one scene; returns the splats that both walks see.
-size_t expect_walks_match(const TestScene& s, ProjectionEffects effects) {
+size_t expect_walks_match(const TestScene& s, ProjectionEffects effects,
+                          int projection = PROJECTION_JACOBIAN) {
+    reference::RenderSettings settings;
+    settings.sh_degree = 1;
+    settings.projection = projection;
     const std::vector<float> filters = filters_for(s.model, effects.smoothing);
     const std::vector<float> bound = filters.empty() ? std::vector<float>{0.0f} : filters;
     auto splats = reference::make_splats<double>(s.model);
     splats.smoothing.assign(filters.begin(), filters.end());
     const auto& kernel = reference::kernel_table(s.model.kernel, s.model.footprint);
-    const ProjectedFrame frame =
-        project_on_device(s.model, s.camera, 1, EVALUATION_POLYNOMIAL, effects, bound);
+    const ProjectedFrame frame = project_on_device(s.model, s.camera, 1, EVALUATION_POLYNOMIAL,
+                                                   effects, bound, LOW_PASS_DEFAULT, projection);
     std::vector<reference::ProjectedSplat<double>> truth;
     for (size_t i = 0; i < s.model.size(); ++i)
-        truth.push_back(reference::project(splats, i, s.camera, {.sh_degree = 1}, kernel));
+        truth.push_back(reference::project(splats, i, s.camera, settings, kernel));
     reference::make_tile_lists(s.camera.width, s.camera.height, truth);
     std::vector<double> expected, got;
     SplatModel seen = s.model;
@@ -60,10 +64,12 @@ size_t expect_walks_match(const TestScene& s, ProjectionEffects effects) {
     EXPECT_TRUE(compare("projection", expected, got, tolerance(allowed), 7));
 
     const Partials partials = Partials::random(seen.size(), 5);
-    const DoubleGradients d = gradients_in_double(seen, s.camera, 1, partials, seen_filters);
+    const DoubleGradients d =
+        gradients_in_double(seen, s.camera, 1, partials, seen_filters, projection);
     if (seen_filters.empty()) seen_filters = {0.0f};
-    const PassState after = run_backward_pass(seen, s.camera, 1, UPDATE_STORE, start_state(seen),
-                                              partials, {}, effects, seen_filters);
+    const PassState after =
+        run_backward_pass(seen, s.camera, 1, UPDATE_STORE, start_state(seen), partials, {}, effects,
+                          seen_filters, false, projection);
     EXPECT_EQ(after.status.bad_gradients, 0u);
     const auto stored = after.d;
     for (int a = 0; a < kAttributeCount; ++a) {
@@ -173,6 +179,28 @@ TEST(ProjectionEffects, all_at_once_match_double) {
     EXPECT_GT(expect_walks_match(
                   s, {.antialias = true, .smoothing = true, .lens = true, .shutter = true}),
               60u);
+}
+
+TEST(ProjectionEffects, sigma_points_match_double) {
+    for (const int projection : {PROJECTION_UNSCENTED, PROJECTION_AUTO})
+        for (const auto& [name, lens] : test_lenses()) {
+            SCOPED_TRACE(name);
+            TestScene s = scene_for(KERNEL_GAUSSIAN, Footprint::psi, 0.8);
+            const bool pinhole = name == "FOV";
+            if (!pinhole) s.camera.lens = lens;
+            EXPECT_GT(expect_walks_match(s, {.lens = !pinhole}, projection), 50u);
+        }
+}
+
+TEST(ProjectionEffects, sigma_points_with_everything_else_match_double) {
+    TestScene s = scene_for(KERNEL_BETA, Footprint::psi, 0.8);
+    s.model.antialias = true;
+    s.camera.lens = test_lenses()[4].second;
+    s.camera.shutter = {true, {0.01, -0.02, 0.015}, {0.02, -0.01, 0.03}};
+    EXPECT_GT(
+        expect_walks_match(s, {.antialias = true, .smoothing = true, .lens = true, .shutter = true},
+                           PROJECTION_UNSCENTED),
+        60u);
 }
 
 TEST(ProjectionEffects, antialias_of_needles_and_discs_matches_double) {

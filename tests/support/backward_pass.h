@@ -97,7 +97,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
                                    int update, const PassState& before, const Partials& partials,
                                    const AdamStep& step = {}, const ProjectionEffects& effects = {},
                                    const std::vector<float>& filters = {0.0f},
-                                   bool by_chunks = false) {
+                                   bool by_chunks = false, int projection = PROJECTION_JACOBIAN) {
     Device& device = shared_device();
     const auto n = static_cast<std::uint32_t>(model.size());
     SpecConstants constants = kernel_constants(model.kernel, model.footprint);
@@ -108,6 +108,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     constants["REST"] = step.rest;
     constants["FLATNESS"] = step.flatness_weight > 0 ? 1 : 0;
     constants["SUMS_BY_CHUNKS"] = by_chunks ? 1 : 0;
+    constants["PROJECTION"] = projection;
     add_constants(effects, constants);
     const Pipeline pipeline(device, "project_backward", constants);
     std::vector<float> sums, rest, exponent;
@@ -169,9 +170,11 @@ struct DoubleGradients {
 
 inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera& camera,
                                            int sh_degree, const Partials& partials,
-                                           const std::vector<float>& filters = {}) {
+                                           const std::vector<float>& filters = {},
+                                           int projection = PROJECTION_JACOBIAN) {
     reference::RenderSettings settings;
     settings.sh_degree = sh_degree;
+    settings.projection = projection;
     auto splats = reference::make_splats<double>(model);
     splats.smoothing.assign(filters.begin(), filters.end());
     const auto& kernel = reference::kernel_table(model.kernel, model.footprint);

@@ -26,7 +26,8 @@ inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& c
                                         int sh_degree = 3, int evaluation = EVALUATION_POLYNOMIAL,
                                         const ProjectionEffects& effects = {},
                                         const std::vector<float>& filters = {0.0f},
-                                        double low_pass = LOW_PASS_DEFAULT) {
+                                        double low_pass = LOW_PASS_DEFAULT,
+                                        int projection = PROJECTION_JACOBIAN) {
     Device& device = shared_device();
     const auto n = static_cast<std::uint32_t>(model.size());
     SpecConstants constants = kernel_constants(model.kernel, model.footprint, evaluation, 5,
@@ -34,6 +35,7 @@ inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& c
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = std::min(sh_degree, model.sh_degree);
     constants["SH_STORED"] = model.sh_degree;
+    constants["PROJECTION"] = projection;
     add_constants(effects, constants);
     const Pipeline pipeline(device, "project", constants);
     const GuardedBuffer cameras(device, "cameras", std::vector{camera_data(camera, model.origin)});

@@ -203,6 +203,7 @@ class GradientErrors {
         walk.polynomial_degree = frame.options.polynomial_degree;
         walk.storage = frame.options.storage;
         walk.depth_order = frame.options.depth_order;
+        walk.projection = frame.options.projection;
         walk.alpha_cutoff = frame.options.alpha_cutoff;
         walk.transmittance_stop = frame.options.transmittance_stop;
         std::vector<double> errors;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Gradients of the projection's effects (lens, rolling shutter, 3D smoothing filter and
-// anti-aliasing) against central differences of a random linear function of the projection's
+// Gradients of the projection's effects (lens, rolling shutter, 3D smoothing filter, anti-aliasing)
+// and of sigma points against central differences of a random linear function of the projection's
 // results.
 #include <gtest/gtest.h>
 
 #include "engine/core/rng.h"
 #include "engine/reference/reference_lens.h"
 #include "engine/reference/reference_render.h"
+#include "engine/reference/reference_sigma_points.h"
 #include "engine/scene/pose_metric.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/test_lenses.h"
@@ -39,7 +40,8 @@ struct Weights {
 };
 
 /// Every parameter of every splat that the camera sees; returns how many splats those are.
-size_t expect_gradients(const std::string& name, Splats<double> splats, const Camera& camera) {
+size_t expect_gradients(const std::string& name, Splats<double> splats, const Camera& camera,
+                        const RenderSettings& settings = {}) {
     const KernelTable& kernel = kernel_table(splats.kernel, splats.footprint);
     SplatGradients<double> out;
     out.resize_like(splats);
@@ -47,18 +49,18 @@ size_t expect_gradients(const std::string& name, Splats<double> splats, const Ca
     std::vector<double> expected, got;
     for (size_t i = 0; i < splats.size(); ++i) {
         const Weights w(i);
-        const auto now = project(splats, i, camera, {}, kernel);
+        const auto now = project(splats, i, camera, settings, kernel);
         if (now.cull != Cull::none) continue;
         ++seen;
-        project_backward(splats, i, camera, {}, kernel, {now, w.d}, out);
+        project_backward(splats, i, camera, settings, kernel, {now, w.d}, out);
         const auto check = [&](std::vector<double>& values, const std::vector<double>& d,
                                size_t stride) {
             for (size_t k = i * stride; k < (i + 1) * stride; ++k) {
                 const double kept = values[k];
                 values[k] = kept + kEffectStep;
-                const double above = w.of(project(splats, i, camera, {}, kernel));
+                const double above = w.of(project(splats, i, camera, settings, kernel));
                 values[k] = kept - kEffectStep;
-                const double below = w.of(project(splats, i, camera, {}, kernel));
+                const double below = w.of(project(splats, i, camera, settings, kernel));
                 values[k] = kept;
                 expected.push_back((above - below) / (2 * kEffectStep));
                 got.push_back(d[k]);
@@ -159,6 +161,214 @@ TEST(ReferenceEffects, shutter_gradients_match_differences) {
                 splats.antialias = antialias;
                 EXPECT_GT(expect_gradients("shutter", splats, s.camera), 15U);
             }
+}
+
+size_t points_used(const Splats<double>& splats, const Camera& camera, int projection) {
+    size_t used = 0;
+    for (size_t i = 0; i < splats.size(); ++i) {
+        const RowCamera<double> row = row_camera(&splats.position[i * 3], camera);
+        RenderSettings settings;
+        settings.projection = projection;
+        const auto mean = mean_in_camera(&splats.position[i * 3], row.camera);
+        const auto rotation = rotation_terms(&splats.rotation[i * 4]);
+        used += covariance_terms(mean, rotation, &splats.log_scale[i * 3], 0.0, row, settings, 1.0)
+                    .sigma.used;
+    }
+    return used;
+}
+
+TEST(ReferenceSigmaPoints, gradients_match_differences) {
+    RenderSettings settings;
+    for (const int projection : {PROJECTION_UNSCENTED, PROJECTION_AUTO})
+        for (const bool shutter : {false, true})
+            for (const bool antialias : {false, true})
+                for (const auto& [name, lens] : test::test_lenses()) {
+                    if (projection == PROJECTION_AUTO && name != "OPENCV_FISHEYE") continue;
+                    test::TestScene s = scene_of(0.8);
+                    if (name != "FOV") s.camera.lens = lens;  // a pinhole in its place
+                    if (shutter) s.camera.shutter = kShutters[0];
+                    for (float& scale : s.model.log_scale)
+                        if (projection == PROJECTION_AUTO) scale += 1;
+                    auto splats = make_splats<double>(s.model);
+                    splats.antialias = antialias;
+                    settings.projection = projection;
+                    EXPECT_GT(points_used(splats, s.camera, projection), 10U) << name;
+                    EXPECT_GT(expect_gradients(name, splats, s.camera, settings), 15U);
+                }
+}
+
+TEST(ReferenceSigmaPoints, gradients_of_the_camera_match_differences) {
+    test::TestScene s = scene_of(0.8);
+    s.camera.lens = test::test_lenses()[4].second;
+    const auto splats = make_splats<double>(s.model);
+    const KernelTable& kernel = kernel_table(splats.kernel, splats.footprint);
+    RenderSettings settings;
+    settings.projection = PROJECTION_UNSCENTED;
+    const auto value = [&](const Camera& camera) {
+        double sum = 0;
+        for (size_t i = 0; i < splats.size(); ++i) {
+            const auto p = project(splats, i, camera, settings, kernel);
+            if (p.cull == Cull::none) sum += Weights(i).of(p);
+        }
+        return sum;
+    };
+    CameraGradients<double> d;
+    SplatGradients<double> out;
+    out.resize_like(splats);
+    for (size_t i = 0; i < splats.size(); ++i) {
+        const auto p = project(splats, i, s.camera, settings, kernel);
+        CameraGradients<double> one;
+        const Weights w(i);
+        project_backward(splats, i, s.camera, settings, kernel, {p, w.d}, out, &one);
+        if (p.cull == Cull::none) d += one;
+    }
+    const auto slope = [&](double& number) {
+        const double kept = number;
+        number = kept + kEffectStep;
+        const double above = value(s.camera);
+        number = kept - kEffectStep;
+        const double below = value(s.camera);
+        number = kept;
+        return (above - below) / (2 * kEffectStep);
+    };
+    EXPECT_NEAR(d.d_focal.x, slope(s.camera.fx), 1e-6 + 1e-5 * std::abs(d.d_focal.x));
+    EXPECT_NEAR(d.d_focal.y, slope(s.camera.fy), 1e-6 + 1e-5 * std::abs(d.d_focal.y));
+    EXPECT_NEAR(d.d_translation.x, slope(s.camera.translation.x), 1e-4);
+    EXPECT_NEAR(d.d_translation.z, slope(s.camera.translation.z), 1e-4);
+    // Turns keep the matrix a rotation: dL/d(turn) = sum over columns of column x d_column.
+    glm::dvec3 twist = glm::cross(s.camera.translation, d.d_translation);
+    for (int c = 0; c < 3; ++c) twist += glm::cross(s.camera.rotation[c], d.d_rotation[c]);
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto turned = [&](double angle) {
+            glm::dvec3 turn(0.0);
+            turn[axis] = angle;
+            Camera camera = s.camera;
+            camera.rotation = exp_rotation(turn) * camera.rotation;
+            camera.translation = exp_rotation(turn) * camera.translation;
+            return value(camera);
+        };
+        const double by = (turned(kEffectStep) - turned(-kEffectStep)) / (2 * kEffectStep);
+        EXPECT_NEAR(twist[axis], by, 1e-4 * (1 + std::abs(by))) << axis;
+    }
+}
+
+TEST(ReferenceSigmaPoints, small_splats_are_those_of_the_jacobian) {
+    test::TestScene s = scene_of(0.8);
+    for (float& scale : s.model.log_scale) scale -= 6;
+    const auto splats = make_splats<double>(s.model);
+    const KernelTable& kernel = kernel_table(splats.kernel, splats.footprint);
+    RenderSettings unscented, by_auto, sharp;
+    unscented.projection = PROJECTION_UNSCENTED;
+    by_auto.projection = PROJECTION_AUTO;
+    sharp.low_pass = unscented.low_pass = by_auto.low_pass = 1e-12;
+    EXPECT_EQ(points_used(splats, s.camera, PROJECTION_AUTO), 0U);
+    size_t seen = 0;
+    for (size_t i = 0; i < splats.size(); ++i) {
+        const auto a = project(splats, i, s.camera, sharp, kernel);
+        const auto b = project(splats, i, s.camera, unscented, kernel);
+        const auto c = project(splats, i, s.camera, by_auto, kernel);
+        if (a.cull != Cull::none) continue;
+        ++seen;
+        EXPECT_NEAR(a.mean_px.x, b.mean_px.x, 1e-4);
+        EXPECT_NEAR(a.l11 / b.l11, 1, 1e-4);
+        EXPECT_NEAR(a.l22 / b.l22, 1, 1e-4);
+        EXPECT_NEAR(a.depth_deviation / b.depth_deviation, 1, 1e-3);
+        EXPECT_EQ(a.l21, c.l21);
+        EXPECT_EQ(a.mean_px, c.mean_px);
+    }
+    EXPECT_GT(seen, 15U);
+}
+
+/// Sum of |footprint - integrated| over the integrated one's sum, on a grid of pixels that reaches
+/// four standard deviations.
+double footprint_error(const Splats<double>& splats, const Camera& camera, int projection) {
+    RenderSettings settings;
+    settings.projection = projection;
+    settings.low_pass = 1e-9;
+    const auto p =
+        project(splats, 0, camera, settings, kernel_table(splats.kernel, Footprint::psi));
+    EXPECT_EQ(p.cull, Cull::none);
+    settings.projection = PROJECTION_JACOBIAN;
+    const auto centre =
+        project(splats, 0, camera, settings, kernel_table(splats.kernel, Footprint::psi));
+    double off = 0, all = 0;
+    constexpr int kSide = 21;
+    for (int y = 0; y < kSide; ++y)
+        for (int x = 0; x < kSide; ++x) {
+            const glm::dvec2 share(2.0 * x / (kSide - 1) - 1, 2.0 * y / (kSide - 1) - 1);
+            const glm::dvec2 pixel =
+                centre.mean_px +
+                4.0 * share * glm::dvec2(std::sqrt(centre.cov_xx), std::sqrt(centre.cov_yy));
+            const double truth = integrated_footprint(splats, 0, camera, pixel);
+            const glm::dvec2 d = p.mean_px - pixel;
+            const double u = p.l11 * d.x + p.l21 * d.y, v = p.l22 * d.y;
+            off += std::abs(std::exp(-0.5 * (u * u + v * v)) - truth);
+            all += truth;
+        }
+    return off / all;
+}
+
+struct SplatAt {
+    double angle, size;  // degrees off the axis; standard deviation over the distance
+};
+std::pair<double, double> errors_at(const SplatAt& at, const LensTerms& lens) {
+    Camera camera;
+    camera.width = camera.height = 1000;
+    camera.fx = camera.fy = 300;
+    camera.cx = camera.cy = 500;
+    camera.lens = lens;
+    const double angle = at.angle * 3.14159265358979 / 180;
+    Splats<double> splats = make_splats<double>(scene_of(1).model);
+    for (int a = 0; a < kAttributeCount; ++a) {
+        auto& values = attribute_values(splats, a);
+        values.resize(values.size() / 40);
+    }
+    splats.position = {std::sin(angle), 0, std::cos(angle)};
+    splats.log_scale.assign(3, std::log(at.size));
+    splats.rotation = {std::cos(angle / 2), 0, std::sin(angle / 2), 0};
+    splats.opacity_logit = {3};
+    return {footprint_error(splats, camera, PROJECTION_JACOBIAN),
+            footprint_error(splats, camera, PROJECTION_UNSCENTED)};
+}
+
+// The figures of docs/experiments/wide_lens.md.
+TEST(ReferenceSigmaPoints, errors_against_the_integrated_footprint) {
+    LensTerms fisheye, barrel;
+    fisheye.active = barrel.active = true;
+    fisheye.front_tan = fisheye.front_scale = 1;
+    fisheye.fold = 3;
+    fisheye.ray_min = glm::dvec2(-9);
+    fisheye.ray_max = glm::dvec2(9);
+    barrel.k = {-0.2, 0.06, 0, 0, 0, 0};
+    barrel.fold = 1.5;
+    barrel.ray_min = glm::dvec2(-2);
+    barrel.ray_max = glm::dvec2(2);
+    struct Row {
+        double angle;
+        std::array<double, 6> percent;  // of Jacobian and sigma points at sizes 0.03, 0.1 and 0.2
+    };
+    const auto check = [](const char* name, const LensTerms& lens, const std::vector<Row>& rows) {
+        constexpr std::array kSizes = {0.03, 0.1, 0.2};
+        for (const Row& row : rows)
+            for (std::size_t i = 0; i < kSizes.size(); ++i) {
+                const auto [jacobian, unscented] = errors_at({row.angle, kSizes[i]}, lens);
+                EXPECT_NEAR(100 * jacobian, row.percent[2 * i], 0.06) << name << row.angle;
+                EXPECT_NEAR(100 * unscented, row.percent[2 * i + 1], 0.06) << name << row.angle;
+            }
+    };
+    check("pinhole", {},
+          {{0, {0.4, 0.4, 4.1, 4.1, 17.0, 17.0}},
+           {30, {4.2, 3.0, 14.5, 10.9, 31.6, 25.9}},
+           {45, {7.2, 5.2, 24.5, 18.5, 47.9, 38.5}}});
+    check("barrel", barrel,
+          {{0, {0.2, 0.3, 2.4, 3.6, 10.1, 14.3}},
+           {30, {1.5, 1.3, 5.8, 5.4, 17.0, 17.1}},
+           {45, {6.2, 4.5, 21.5, 17.0, 27.7, 27.7}}});
+    check("fisheye", fisheye,
+          {{0, {0.1, 0.3, 1.4, 3.3, 5.8, 12.7}},
+           {30, {0.1, 0.5, 1.4, 3.4, 5.8, 12.8}},
+           {45, {0.1, 0.7, 1.4, 3.8, 5.9, 13.1}},
+           {70, {0.2, 1.1, 1.5, 4.9, 10.1, 10.1}}});
 }
 
 TEST(ReferenceEffects, a_splat_is_where_the_camera_of_its_row_sees_it) {
