@@ -72,7 +72,8 @@ void set_sigma_rows(inout SigmaPoints s) {
     s.r1 = vec3(sqrt(dot_rows(x, x)), 0.0, 0.0);
     s.q1 = add_rows(inverse_or_zero(s.r1.x), x, 0.0, x);
     const float yx = dot_rows(y, s.q1);
-    const SigmaRow rest = add_rows(1.0, y, -yx, s.q1);
+    SigmaRow rest = add_rows(1.0, y, -yx, s.q1);
+    rest = add_rows(1.0, rest, -dot_rows(rest, s.q1), s.q1);  // once more, for needles
     s.r2 = vec3(yx, sqrt(dot_rows(rest, rest)), 0.0);
     s.q2 = add_rows(inverse_or_zero(s.r2.y), rest, 0.0, rest);
     const vec2 zxy = vec2(dot_rows(z, s.q1), dot_rows(z, s.q2));

@@ -62,27 +62,33 @@ struct WeightedLoss {
     }
 };
 
-std::vector<double> exact_gradient(const TestScene& scene) {
+reference::RenderSettings truth_by(int projection) {
+    reference::RenderSettings settings = truth_settings();
+    settings.projection = projection;
+    return settings;
+}
+
+std::vector<double> exact_gradient(const TestScene& scene, int projection) {
     const WeightedLoss loss(scene.camera);
-    const auto result = reference::render(scene.model, scene.camera, truth_settings());
-    const auto truth = reference::backward(scene.model, scene.camera, truth_settings(), result,
+    const reference::RenderSettings settings = truth_by(projection);
+    const auto result = reference::render(scene.model, scene.camera, settings);
+    const auto truth = reference::backward(scene.model, scene.camera, settings, result,
                                            loss.d_image, loss.d_alpha);
     return along_all(as_device(truth.camera), scene.camera);
 }
 
 /// Pictures jump across a cut-off, so a difference whose two pictures blend different samples is
 /// left out.
-void compare_differences(const TestScene& scene) {
+void compare_differences(const TestScene& scene, int projection = PROJECTION_JACOBIAN) {
     const WeightedLoss loss(scene.camera);
-    const std::vector<double> exact = exact_gradient(scene);
+    const std::vector<double> exact = exact_gradient(scene, projection);
+    const reference::RenderSettings settings = truth_by(projection);
     const auto splats = reference::make_splats<double>(scene.model);
     int compared = 0;
     for (int which = 0; which < freedoms(scene.camera); ++which) {
         const double h = 1e-6;
-        const auto above =
-            reference::render(splats, moved(scene.camera, which, h), truth_settings());
-        const auto below =
-            reference::render(splats, moved(scene.camera, which, -h), truth_settings());
+        const auto above = reference::render(splats, moved(scene.camera, which, h), settings);
+        const auto below = reference::render(splats, moved(scene.camera, which, -h), settings);
         if (above.images.contributions.data != below.images.contributions.data) continue;
         ++compared;
         const double difference = (loss.of(above) - loss.of(below)) / (2 * h);
@@ -91,15 +97,17 @@ void compare_differences(const TestScene& scene) {
     EXPECT_GE(compared, freedoms(scene.camera) / 2);
 }
 
-void compare_device(const TestScene& scene) {
+void compare_device(const TestScene& scene, int projection = PROJECTION_JACOBIAN) {
     const ImageF weights = random_image(scene.camera, 3, 11);
     const ImageF alpha_weights = random_image(scene.camera, 1, 12);
-    GradientRenderer renderer(shared_device(), scene.model, {.camera = true});
+    Accuracy accuracy;
+    accuracy.choice[kSplatProjection] = projection;
+    GradientRenderer renderer(shared_device(), scene.model, {.accuracy = accuracy, .camera = true});
     renderer.render(scene.camera, kBackground);
     const ViewGradients view = renderer.backward(weights, alpha_weights);
     ASSERT_TRUE(view.d_camera.has_value());
     ASSERT_GT(view.status.visible, 3u);
-    const std::vector<double> exact = exact_gradient(scene);
+    const std::vector<double> exact = exact_gradient(scene, projection);
     const std::vector<double> got = along_all(*view.d_camera, scene.camera);
     std::vector<std::tuple<const char*, int, int>> parts{{"turns", 0, 3},
                                                          {"translation", 3, 6},
@@ -146,6 +154,17 @@ TEST(CameraGradient, of_a_rolling_shutter_is_its_differences_and_the_devices) {
         compare_differences(scene);
         compare_device(scene);
     }
+}
+
+TEST(CameraGradient, of_sigma_points_is_its_differences_and_the_devices) {
+    for (const bool lens : {false, true})
+        for (const bool shutter : {false, true}) {
+            TestScene scene = scene_of(KERNEL_GAUSSIAN, Footprint::psi);
+            if (lens) scene.camera.lens = test_lenses()[4].second;
+            if (shutter) scene.camera.shutter = {true, {0.02, -0.03, 0.02}, {0.03, 0.02, -0.03}};
+            compare_differences(scene, PROJECTION_UNSCENTED);
+            compare_device(scene, PROJECTION_UNSCENTED);
+        }
 }
 
 TEST(CameraGradient, of_the_device_is_that_of_the_reference_with_every_kernel_long) {

@@ -70,11 +70,15 @@ TestScene depth_scene(int kernel, Footprint footprint) {
 }
 
 void expect_agreement(const TestScene& s, int reading, double level = 0.5,
-                      const ProjectionEffects& effects = {}) {
-    Renderer renderer(shared_device(), s.model, Accuracy{}, effects);
+                      const ProjectionEffects& effects = {}, int projection = PROJECTION_JACOBIAN) {
+    Accuracy accuracy;
+    accuracy.choice[kSplatProjection] = projection;
+    reference::RenderSettings settings;
+    settings.projection = projection;
+    Renderer renderer(shared_device(), s.model, accuracy, effects);
     renderer.render(s.camera);
     const ImageF got = renderer.render_depth(static_cast<DepthReading>(reading), float(level));
-    const Agreement a = compare_depths(s, got, static_cast<Reading>(reading), level, {});
+    const Agreement a = compare_depths(s, got, static_cast<Reading>(reading), level, settings);
     EXPECT_GT(a.surfaces, 500u);
     // A splat whose alpha is the cut-off within rounding is drawn on one side alone, and where a
     // slice begins with a jump or a spike, T passes a thousandth of it within the last step.
@@ -146,6 +150,12 @@ TEST(MedianDepth, takes_exact_footprints_and_lenses) {
     expect_agreement(s, DEPTH_READING_FRONT);
     s.camera.lens = test_lenses().front().second;
     expect_agreement(s, DEPTH_READING_FRONT, 0.5, {.lens = true});
+}
+
+TEST(MedianDepth, takes_sigma_points) {
+    for (const int reading : {DEPTH_READING_PLANE, DEPTH_READING_FRONT})
+        expect_agreement(depth_scene(KERNEL_GAUSSIAN, Footprint::psi), reading, 0.5, {},
+                         PROJECTION_UNSCENTED);
 }
 
 TEST(MedianDepth, leaves_half_of_the_light_in_long_lists) {

@@ -210,7 +210,8 @@ TEST(ProjectionEffects, antialias_of_needles_and_discs_matches_double) {
             for (int c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = (c == 0) == disc ? -7 : -1;
         s.model.antialias = true;
         for (float& logit : s.model.opacity_logit) logit = 8;
-        EXPECT_GT(expect_walks_match(s, {.antialias = true}), 60u);
+        for (const int projection : {PROJECTION_JACOBIAN, PROJECTION_UNSCENTED})
+            EXPECT_GT(expect_walks_match(s, {.antialias = true}, projection), 60u);
     }
 }
 
