@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <vector>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/quantile.h"
 #include "engine/core/rng.h"
 #include "engine/data/image_io.h"
@@ -29,6 +31,7 @@ constexpr double kLeastWidth = 0.02;     // of the length of a path: narrower is
 constexpr double kTooCoarse = 0.2;       // of the reach
 constexpr double kContradiction = 0.15;  // of two scales, in natural logarithms
 constexpr std::size_t kPhotoHead = 1 << 17;
+constexpr double kDroneApart = 10;  // metres on the ground, between EXIF and XMP
 
 // Earth-centred, earth-fixed, metres.
 dvec3 on_earth(const GeoPosition& p) {
@@ -106,7 +109,70 @@ Fit robust_fit(std::span<const dvec3> centres, const std::vector<dvec3>& metres)
     return best;
 }
 
+/// The number of an attribute or element of the drone's XMP.
+std::optional<double> drone_number(std::string_view file, std::string_view name) {
+    const std::string whole = fmt::format("drone-dji:{}", name);
+    for (std::size_t at = file.find(whole); at != std::string_view::npos;
+         at = file.find(whole, at + 1)) {
+        std::string_view rest = file.substr(at + whole.size());
+        if (rest.starts_with("=\"") || rest.starts_with("='"))
+            rest.remove_prefix(2);
+        else if (rest.starts_with('>'))
+            rest.remove_prefix(1);
+        else
+            continue;  // the end of an element, or a longer name
+        if (rest.starts_with('+')) rest.remove_prefix(1);
+        double value = 0;
+        const auto [end, error] = parse_number(rest.data(), rest.data() + rest.size(), value);
+        const bool ends =
+            end != rest.data() + rest.size() && (*end == '"' || *end == '\'' || *end == '<');
+        if (error == std::errc() && ends && std::isfinite(value)) return value;
+    }
+    return std::nullopt;
+}
+
+/// The positions of a data set's photos, and how many of them have two that disagree.
+struct PhotoPositions {
+    std::vector<dvec3> centres;
+    std::vector<GeoPosition> positions;
+    std::size_t apart = 0;
+};
+
+PhotoPositions photo_positions(const Dataset& dataset) {
+    PhotoPositions found;
+    std::filesystem::path last;
+    for (const View& view : dataset.views) {
+        if (view.photo == last || view.photo.empty()) continue;  // faces of one panorama
+        last = view.photo;
+        std::error_code none;
+        if (!std::filesystem::is_regular_file(view.photo, none)) continue;
+        const auto head = read_file_head(view.photo, kPhotoHead);
+        const auto exif = exif_position(head), drone = drone_position(head);
+        if (!exif && !drone) continue;
+        found.centres.push_back(view.camera.centre());
+        found.positions.push_back(exif ? *exif : *drone);
+        if (!exif || !drone) continue;
+        const dvec3 between = east_north_up(*drone, *exif);
+        if (std::hypot(between.x, between.y) > kDroneApart) ++found.apart;
+    }
+    return found;
+}
+
 }  // namespace
+
+std::optional<GeoPosition> drone_position(std::span<const std::byte> file) {
+    const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
+    if (text.find("drone-dji:") == std::string_view::npos) return std::nullopt;
+    const auto latitude = drone_number(text, "GpsLatitude");
+    auto longitude = drone_number(text, "GpsLongitude");
+    if (!longitude) longitude = drone_number(text, "GpsLongtitude");
+    auto altitude = drone_number(text, "AbsoluteAltitude");
+    if (!altitude) altitude = drone_number(text, "RelativeAltitude");
+    if (!latitude || !longitude || !altitude) return std::nullopt;
+    if (std::abs(*latitude) > 90 || std::abs(*longitude) > 180) return std::nullopt;
+    if (*latitude == 0 && *longitude == 0) return std::nullopt;  // no fix
+    return GeoPosition{*latitude, *longitude, *altitude};
+}
 
 dvec3 east_north_up(const GeoPosition& position, const GeoPosition& origin) {
     const dvec3 d = on_earth(position) - on_earth(origin);
@@ -159,20 +225,13 @@ std::optional<FoundPlace> place_by_positions(std::span<const dvec3> centres,
 }
 
 void find_place(Dataset& dataset) {
-    std::vector<dvec3> centres;
-    std::vector<GeoPosition> positions;
-    std::filesystem::path last;
-    for (const View& view : dataset.views) {
-        if (view.photo == last || view.photo.empty()) continue;  // faces of one panorama
-        last = view.photo;
-        std::error_code none;
-        if (!std::filesystem::is_regular_file(view.photo, none)) continue;
-        if (const auto position = exif_position(read_file_head(view.photo, kPhotoHead))) {
-            centres.push_back(view.camera.centre());
-            positions.push_back(*position);
-        }
-    }
+    const auto [centres, positions, apart] = photo_positions(dataset);
     if (positions.empty()) return;
+    if (apart > 0)
+        dataset.notes.push_back(fmt::format(
+            "Warning: in {} photos the positions in EXIF and in the drone's XMP lie more "
+            "than {} m apart. The EXIF counts.",
+            apart, kDroneApart));
     if (positions.size() < kFewestPositions) {
         dataset.notes.push_back(
             fmt::format("The GPS positions of {} photos are too few to tell the scene's scale; {} "

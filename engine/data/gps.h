@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Where photos were taken, by the GPS in their EXIF, and what that says of a scene: how long its
-// unit is, which way north is, and where it lies on earth.
+// Where photos were taken, by the GPS in their EXIF or in the XMP of a drone, and what that says of
+// a scene: how long its unit is, which way north is, and where it lies on earth.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -21,6 +21,12 @@ struct GeoPosition {
 /// damaged, or has no altitude. Never reads outside `file`, which may be just its beginning.
 std::optional<GeoPosition> exif_position(std::span<const std::byte> file);
 
+/// The position in the XMP of a photo by a DJI drone: GpsLatitude, GpsLongitude (in some firmware
+/// GpsLongtitude) and AbsoluteAltitude, or else RelativeAltitude, which is above the place of the
+/// start. Attributes or elements with the prefix drone-dji. Nothing where one of the three is
+/// missing or no number, or where both angles are 0. `file` may be just its beginning.
+std::optional<GeoPosition> drone_position(std::span<const std::byte> file);
+
 /// Metres to the east, to the north and up of `origin`, in the plane that touches the earth there.
 glm::dvec3 east_north_up(const GeoPosition& position, const GeoPosition& origin);
 
@@ -39,9 +45,11 @@ struct FoundPlace {
 std::optional<FoundPlace> place_by_positions(std::span<const glm::dvec3> centres,
                                              std::span<const GeoPosition> positions);
 
-/// Reads the positions of the photos, and sets Dataset::place and, where depths have not set it,
-/// Dataset::metres_per_unit, with a note. A note also says where positions do not determine these,
-/// or are too coarse: where `off` is more than a fifth of `reach`. Fewer than 4 change nothing.
+/// Reads the positions of the photos, that of a drone where there is none in the EXIF, and sets
+/// Dataset::place and, where depths have not set it, Dataset::metres_per_unit, with a note. A note
+/// also says where positions do not determine these, or are too coarse: where `off` is more than a
+/// fifth of `reach`, and where EXIF and drone lie more than 10 m apart on the ground; then the EXIF
+/// counts. Fewer than 4 change nothing.
 void find_place(Dataset& dataset);
 
 }  // namespace darb

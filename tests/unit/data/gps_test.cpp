@@ -101,6 +101,53 @@ TEST(Gps, exif_positions_are_read) {
     }
 }
 
+/// An APP1 segment as drones write it; attributes, or elements.
+std::string drone_xmp(const GeoPosition& p, bool elements, const char* longitude = "GpsLongitude") {
+    const auto number = [&](const char* name, double value) {
+        return fmt::format(fmt::runtime(elements ? "<drone-dji:{0}>{1:+.9f}</drone-dji:{0}>"
+                                                 : " drone-dji:{0}=\"{1:+.9f}\""),
+                           name, value);
+    };
+    const std::string numbers = number("AbsoluteAltitude", p.altitude) +
+                                number("RelativeAltitude", p.altitude - 400) +
+                                number("GpsLatitude", p.latitude) + number(longitude, p.longitude);
+    const std::string text = std::string("http://ns.adobe.com/xap/1.0/\0", 29) +
+                             "<rdf:Description" + (elements ? ">" + numbers : numbers + ">") +
+                             "</rdf:Description>";
+    return "\xFF\xE1" + big_endian(static_cast<std::uint32_t>(text.size() + 2), 2) + text;
+}
+
+std::string photo_by_drone(const GeoPosition& p, bool elements,
+                           const char* longitude = "GpsLongitude") {
+    const std::vector<std::byte> jpeg = encode_jpeg(ImageU8(8, 8, 3), 80);
+    const std::string file(reinterpret_cast<const char*>(jpeg.data()), jpeg.size());
+    return file.substr(0, 2) + drone_xmp(p, elements, longitude) + file.substr(2);
+}
+
+std::optional<GeoPosition> drone_in(const std::string& file) {
+    return drone_position(std::as_bytes(std::span(file)));
+}
+
+TEST(Gps, positions_of_drones_are_read) {
+    for (const bool elements : {false, true})
+        for (const char* longitude : {"GpsLongitude", "GpsLongtitude"}) {
+            const GeoPosition south{-33.856784, -70.215297, 512.5};
+            const auto read = drone_in(photo_by_drone(south, elements, longitude));
+            ASSERT_TRUE(read) << longitude;
+            EXPECT_NEAR(read->latitude, south.latitude, 1e-8);
+            EXPECT_NEAR(read->longitude, south.longitude, 1e-8);
+            EXPECT_NEAR(read->altitude, south.altitude, 1e-8);
+        }
+    std::string file = photo_by_drone(kPlace, false);
+    file.replace(file.find("AbsoluteAltitude"), 16, "AbsoluteAltitudX");
+    ASSERT_TRUE(drone_in(file));
+    EXPECT_NEAR(drone_in(file)->altitude, kPlace.altitude - 400, 1e-8) << "above the start";
+    EXPECT_FALSE(drone_in(photo_with(kPlace, 8, 8))) << "no drone";
+    EXPECT_FALSE(drone_in(photo_by_drone({0, 0, 400}, false))) << "no fix";
+    EXPECT_FALSE(drone_in(photo_by_drone({95, 0, 400}, false)));
+    for (std::size_t size = 0; size < file.size(); ++size) drone_in(file.substr(0, size));
+}
+
 TEST(Gps, metres_around_a_place) {
     for (const glm::dvec3& metres : {glm::dvec3(100, 0, 0), glm::dvec3(0, -80, 0),
                                      glm::dvec3(0, 0, 30), glm::dvec3(55, 66, -7)})
@@ -154,16 +201,20 @@ TEST(Gps, what_does_not_determine_a_place_says_nothing) {
 TEST(Gps, a_data_set_takes_scale_and_place_from_its_photos) {
     const auto folder = test_folder();
     const Flight flight(0.02);
-    const auto write = [&](double noise) {
+    enum Kind { kExif, kDrone, kBoth };
+    const auto write = [&](double noise, Kind kind = kExif) {
         std::string images;
         Pcg32 rng(4);
         for (std::size_t i = 0; i < 12; ++i) {
             const std::string name = fmt::format("{:02d}.jpg", i);
             const glm::dvec3 off(rng.normal(), rng.normal(), rng.normal());
-            write_file_atomic(
-                folder / "images" / name,
-                photo_with(away(2.5 * (flight.rotation * flight.centres[i]) + noise * off), 32,
-                           32));
+            const GeoPosition place =
+                away(2.5 * (flight.rotation * flight.centres[i]) + noise * off);
+            std::string photo =
+                kind == kDrone ? photo_by_drone(place, i % 2 == 0) : photo_with(place, 32, 32);
+            if (kind == kBoth)
+                photo.insert(2, drone_xmp(i == 4 ? away({100, 0, 0}) : place, false));
+            write_file_atomic(folder / "images" / name, photo);
             const glm::dvec3 t = -flight.centres[i];
             images += fmt::format("{} 1 0 0 0 {} {} {} 1 {}\n\n", i + 1, t.x, t.y, t.z, name);
         }
@@ -176,6 +227,17 @@ TEST(Gps, a_data_set_takes_scale_and_place_from_its_photos) {
     EXPECT_NEAR(dataset.metres_per_unit, 2.5, 0.05);
     EXPECT_TRUE(dataset.place.known());
     EXPECT_NE(dataset.notes.back().find("By the GPS of 12 photos"), std::string::npos);
+    write(0.02, kDrone);
+    const Dataset drone = load_dataset(folder);
+    EXPECT_NEAR(drone.metres_per_unit, 2.5, 0.05);
+    EXPECT_NE(drone.notes.back().find("By the GPS of 12 photos"), std::string::npos);
+    write(0.02, kBoth);
+    const Dataset both = load_dataset(folder);
+    EXPECT_EQ(both.metres_per_unit, dataset.metres_per_unit) << "the EXIF counts";
+    EXPECT_TRUE(std::ranges::any_of(both.notes, [](const std::string& note) {
+        return note.find("in 1 photos the positions in EXIF and in the drone's XMP") !=
+               std::string::npos;
+    }));
     write(30);
     const Dataset coarse = load_dataset(folder);
     EXPECT_EQ(coarse.metres_per_unit, 0);
