@@ -245,6 +245,7 @@ void apply_theme(float scale) {
     style.ItemInnerSpacing = ImVec2(6, 4);
     style.ScrollbarSize = 12;
     style.WindowBorderSize = 1;
+    style.FrameBorderSize = 1;  // else an empty box to tick is hardly seen on the ground
     style.ScaleAllSizes(scale);
 }
 

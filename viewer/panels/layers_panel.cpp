@@ -41,7 +41,7 @@ void layer_row(std::size_t n, Session& s) {
     tip(layer.file.empty() ? "Selects its splats, which 6, 7 and 8 then move, turn and scale"
                            : layer.file.string().c_str());
     ImGui::SameLine();
-    ImGui::TextDisabled("%zu", o.splats[n]);
+    ImGui::TextDisabled("%s", count_text(o.splats[n]).c_str());
     tip("Splats of the layer that are not deleted");
     ImGui::PopID();
 }

@@ -6,17 +6,12 @@
 
 #include <string>
 
-#include "engine/report/html.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/panels/panels.h"
 
 namespace darb {
 
 namespace {
-
-std::string number(std::size_t count) {
-    return format_number(static_cast<double>(count));
-}
 
 void row(Session& s, Tab tab, const std::string& name, const std::string& what) {
     const float room = ImGui::GetContentRegionAvail().x,
@@ -33,17 +28,18 @@ void row(Session& s, Tab tab, const std::string& name, const std::string& what) 
 void draw_outliner(Session& s) {
     if (s.training.live && !s.scene)
         row(s, Tab::training, "Training run",
-            number(s.training.splats.empty() ? 0
-                                             : static_cast<std::size_t>(s.training.splats.back())) +
+            count_text(s.training.splats.empty()
+                           ? 0
+                           : static_cast<std::size_t>(s.training.splats.back())) +
                 " splats");
     if (s.scene) {
         row(s, Tab::scene, scene_name(s.scene->file, true),
-            number(s.scene->model.size() - s.edit.removed_count()) +
+            count_text(s.scene->model.size() - s.edit.removed_count()) +
                 (s.scene->is_points ? " points" : " splats"));
         if (s.edit.selected_count() > 0)
-            row(s, Tab::splats, "Selection", number(s.edit.selected_count()) + " splats");
+            row(s, Tab::splats, "Selection", count_text(s.edit.selected_count()) + " splats");
     }
-    if (s.mesh) row(s, Tab::mesh, "Mesh", number(s.mesh->mesh.face_count()) + " faces");
+    if (s.mesh) row(s, Tab::mesh, "Mesh", count_text(s.mesh->mesh.face_count()) + " faces");
     if (!s.photos.views.empty())
         row(s, Tab::camera, "Cameras", fmt::format("{} photos", s.photos.views.size()));
     if (const std::size_t points = s.scene ? s.edit.facts().measured.points.size() : 0; points > 0)

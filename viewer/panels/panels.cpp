@@ -10,6 +10,7 @@
 #include <cstring>
 #include <utility>
 
+#include "engine/report/html.h"
 #include "viewer/gui.h"
 
 namespace darb {
@@ -233,6 +234,10 @@ void path_field(const char* label, std::filesystem::path& path) {
     std::strncpy(text, now.c_str(), sizeof text - 1);
     text[sizeof text - 1] = '\0';
     if (ImGui::InputText(label, text, sizeof text)) path = text;
+}
+
+std::string count_text(std::size_t count) {
+    return format_number(static_cast<double>(count));
 }
 
 void tip(const char* text) {

@@ -63,6 +63,9 @@ inline ImU32 axis_colour(int axis) {
     return colour_u32(theme::theme_colour(palette::kAxes[static_cast<std::size_t>(axis)]));
 }
 
+/// With separated thousands.
+std::string count_text(std::size_t count);
+
 /// The text, cut at its end so that it is at most this wide, px.
 std::string cut_text(const std::string& text, float width);
 /// Explains the control before it while the pointer rests on it.

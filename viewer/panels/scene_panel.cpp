@@ -59,7 +59,8 @@ void scene_panel(Session& s) {
     ImGui::TextWrapped("%s", scene_name(scene.file, true).c_str());
     tip(scene.file.string().c_str());
     if (!scene.is_points)
-        ImGui::Text("%zu splats, colours of degree %d", scene.model.size() - s.edit.removed_count(),
+        ImGui::Text("%s splats, colours of degree %d",
+                    count_text(scene.model.size() - s.edit.removed_count()).c_str(),
                     scene.model.sh_degree);
     ImGui::TextWrapped("%s, loaded in %.2f s", scene.format.c_str(), scene.load_s);
     if (const double unit = s.edit.facts().metres_per_unit; unit > 0)
