@@ -29,7 +29,8 @@ bool has_selection(const Session& s) {
 }
 bool can_remove(const Session& s) {
     return can_edit(s) &&
-           (s.edit.selected_count() > 0 || s.selection.shown || s.tools.tool == Tool::measure);
+           (s.edit.selected_count() > 0 || s.selection.shown || s.tools.tool == Tool::measure ||
+            (s.tools.tool == Tool::polygon && s.tools.drawing));
 }
 bool has_cameras(const Session& s) {
     return !s.photos.views.empty();
@@ -59,9 +60,10 @@ void step_training(Session& s) {
     ++s.training.steps_to_go;
 }
 
-// Removes the last measured point while measuring, else the selection, or what is inside the box or
-// sphere that is shown.
+// Removes the last corner or point of a polygon or a measurement that is under way, else the
+// selection, or what is inside the box or sphere that is shown.
 void remove_selected(Session& s) {
+    if (drop_corner(s)) return;
     if (s.tools.tool == Tool::measure)
         drop_measured_point(s);
     else if (s.edit.selected_count() > 0)
@@ -463,6 +465,17 @@ constexpr Command kCommands[] = {
      take_tool<Tool::lasso>,
      has_scene,
      is_chosen<Tool::lasso>},
+    {Key::tool_polygon,
+     Menu::tools,
+     "Select by polygon",
+     {"Shift+3"},
+     "Click corners; a click on the first one, or a double click, selects what is inside; Delete "
+     "takes the last corner away; Shift adds, Ctrl takes away",
+     Icon::polygon,
+     false,
+     take_tool<Tool::polygon>,
+     has_scene,
+     is_chosen<Tool::polygon>},
     {Key::tool_brush,
      Menu::tools,
      "Select by brush",
@@ -483,6 +496,17 @@ constexpr Command kCommands[] = {
      take_tool<Tool::sphere>,
      has_scene,
      is_chosen<Tool::sphere>},
+    {Key::tool_flood,
+     Menu::tools,
+     "Select by flood",
+     {"O"},
+     "Click a splat to select it and what touches it in colours like its own; Shift adds, Ctrl "
+     "takes away",
+     Icon::flood,
+     false,
+     take_tool<Tool::flood>,
+     has_scene,
+     is_chosen<Tool::flood>},
     {Key::tool_move,
      Menu::tools,
      "Move",

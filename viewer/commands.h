@@ -26,6 +26,8 @@ enum class Icon {
     turn,
     scale,
     measure,
+    polygon,
+    flood,
     compare,
     cameras,
     grid,

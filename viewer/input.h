@@ -55,6 +55,8 @@ enum class Key {
     tool_turn,
     tool_scale,
     tool_measure,
+    tool_polygon,
+    tool_flood,
     add_key,
     play,  // a path, or a training run
     step,  // of a training run

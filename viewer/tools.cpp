@@ -134,6 +134,7 @@ Selector stroke_selector(const Session& s, const Camera& camera) {
         case Tool::rectangle:
             return by::Rectangle{camera, t.stroke.front(), t.stroke.back()};
         case Tool::lasso:
+        case Tool::polygon:
             return by::Polygon{camera, t.stroke};
         case Tool::brush:
             return by::Brush{camera, t.stroke, double{t.brush_px} * s.gui_scale};
@@ -148,12 +149,16 @@ Selector stroke_selector(const Session& s, const Camera& camera) {
     return by::Nothing{};
 }
 
+Combine wanted_combine(const Input& in) {
+    return in.shift ? Combine::add : in.control ? Combine::subtract : Combine::replace;
+}
+
 void begin_stroke(const Input& in, const Camera& camera, Session& s) {
     ToolState& t = s.tools;
     t.drawing = true;
     t.stroke = in.trail;
     if (t.stroke.empty()) t.stroke.emplace_back(in.x, in.y);
-    t.combine = in.shift ? Combine::add : in.control ? Combine::subtract : Combine::replace;
+    t.combine = wanted_combine(in);
     const glm::dvec2 at = t.stroke.front();
     if (t.tool == Tool::sphere)
         t.sphere = pick(s.scene->model, s.edit.unseen(), camera, at.x, at.y);
@@ -248,6 +253,54 @@ bool use_measure(const Input& in, const ControlFrame& frame, const Camera& camer
     return true;
 }
 
+/// Each press sets a corner. One at the first corner, or twice at one place, closes the polygon.
+bool use_polygon(const Input& in, const ControlFrame& frame, const Camera& camera, Session& s) {
+    ToolState& t = s.tools;
+    if (!in.left) t.pressed.reset();
+    if (!in.left || t.pressed) return t.drawing || t.pressed;
+    if (frame.panels_want_mouse) return false;
+    const glm::dvec2 at = in.trail.empty() ? glm::dvec2(in.x, in.y) : in.trail.front();
+    t.pressed = at;
+    if (!t.drawing) {
+        t.stroke.clear();
+        t.combine = wanted_combine(in);
+        t.drawing = true;
+    }
+    if (closes_polygon(s, at))
+        end_stroke(camera, s);
+    else if (t.stroke.empty() || glm::distance(t.stroke.back(), at) >= kNearPoint * s.gui_scale)
+        t.stroke.push_back(at);
+    return true;
+}
+
+/// A click selects; a drag belongs to the camera.
+bool use_flood(const Input& in, const ControlFrame& frame, const Camera& camera, Session& s) {
+    ToolState& t = s.tools;
+    const glm::dvec2 at(in.x, in.y);
+    if (!t.pressed) {
+        if (!in.left || frame.panels_want_mouse) return false;
+        t.pressed = in.trail.empty() ? at : in.trail.front();
+        t.pulled = false;
+        t.combine = wanted_combine(in);
+        t.drawing = true;
+    }
+    t.pulled |= glm::distance(*t.pressed, at) > kPull * s.gui_scale;
+    if (in.left) return !t.pulled;
+    const glm::dvec2 pressed = *t.pressed;
+    t.pressed.reset();
+    t.drawing = false;
+    if (t.pulled) return false;
+    const std::optional<glm::dvec3> splat =
+        pick(s.scene->model, s.edit.unseen(), camera, pressed.x, pressed.y);
+    if (!splat) {
+        s.tell("There is no splat at this point.");
+        return true;
+    }
+    const by::Flood flood{*splat, double{t.tolerance}};
+    show_edit(s.edit.perform(edits::Select{flood, t.combine}, s.scene->model), s);
+    return true;
+}
+
 void measure_step(Measurement next, const std::string& what, Session& s) {
     SceneFacts facts = s.edit.facts();
     facts.measured = std::move(next);
@@ -255,6 +308,22 @@ void measure_step(Measurement next, const std::string& what, Session& s) {
 }
 
 }  // namespace
+
+bool drop_corner(Session& s) {
+    ToolState& t = s.tools;
+    if (t.tool != Tool::polygon || !t.drawing) return false;
+    if (!t.stroke.empty()) t.stroke.pop_back();
+    t.drawing = !t.stroke.empty();
+    return true;
+}
+
+bool closes_polygon(const Session& s, const glm::dvec2& px) {
+    const ToolState& t = s.tools;
+    const double near = kNearPoint * s.gui_scale;
+    return t.tool == Tool::polygon && t.drawing && t.stroke.size() >= 3 &&
+           (glm::distance(t.stroke.front(), px) < near ||
+            glm::distance(t.stroke.back(), px) < near);
+}
 
 int measured_point_at(const Session& s, const Camera& camera, const glm::dvec2& px) {
     const std::vector<glm::dvec3>& points = s.edit.facts().measured.points;
@@ -361,8 +430,10 @@ bool use_tool(const Input& in, const ControlFrame& frame, Session& s) {
     t.ignores = ignores;
     if (!s.panels || ignores) return ignores;
     if (has_gizmo(t.tool) && !t.drawing) find_centre(s);
-    if (!t.drawing && (frame.panels_want_mouse || !in.left)) return false;
     const Camera camera = camera_of(s, frame);
+    if (t.tool == Tool::polygon) return use_polygon(in, frame, camera, s);
+    if (!t.drawing && (frame.panels_want_mouse || !in.left)) return false;
+    if (t.tool == Tool::flood) return use_flood(in, frame, camera, s);
     if (t.tool == Tool::measure) return use_measure(in, frame, camera, s);
     if (has_gizmo(t.tool)) return use_gizmo(in, camera, s);
     if (!t.drawing) {

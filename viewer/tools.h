@@ -41,8 +41,20 @@ struct Session;
 struct Input;
 struct ControlFrame;
 
-enum class Tool { navigate, rectangle, lasso, brush, sphere, move, turn, scale, measure };
-inline constexpr int kToolCount = 9;
+/// In the order of their keys (input.h).
+enum class Tool {
+    navigate,
+    rectangle,
+    lasso,
+    brush,
+    sphere,
+    move,
+    turn,
+    scale,
+    measure,
+    polygon,
+    flood
+};
 
 /// How often values occur, for the ranges that one drags.
 struct ValueHistograms {
@@ -57,7 +69,7 @@ struct ValueHistograms {
 struct ToolState {
     Tool tool = Tool::navigate;
     float brush_px = 40;             // radius, px of the window
-    std::vector<glm::dvec2> stroke;  // px, while it is being drawn
+    std::vector<glm::dvec2> stroke;  // px, while it is being drawn; corners of a polygon
     bool drawing = false;
     // ignores the button until it is let go, because its stroke was cancelled
     bool ignores = false;
@@ -73,8 +85,9 @@ struct ToolState {
     // least size in times of the median, the least count of photos.
     float isolated = 0.01f, haze_opacity = 0.1f, haze_size = 5;
     int looked_through = 3;
-    // Of measuring: where the button went down and whether the pointer has left that place, which
-    // measured point it is on, and which side of the measurement has its true length typed.
+    // Of measuring and of tools that are clicked: where the button went down and whether the
+    // pointer has left that place, which measured point it is on, and which side of the measurement
+    // has its true length typed.
     std::optional<glm::dvec2> pressed;
     bool pulled = false;
     int held_point = -1, known_side = -1;  // known_side -1: the whole line
@@ -94,6 +107,11 @@ void choose_tool(Tool tool, Session& session);
 bool cancel_stroke(Session& session);
 /// The measured point within 10 px of the pixel at gui_scale 1; -1: none.
 int measured_point_at(const Session& session, const Camera& camera, const glm::dvec2& px);
+/// Takes the last corner of the polygon away that is being drawn; without corners it is dropped.
+/// Returns whether there was one.
+bool drop_corner(Session& session);
+/// Whether a corner at this pixel would close the polygon that is being drawn.
+bool closes_polygon(const Session& session, const glm::dvec2& px);
 /// Steps of measuring: adds a point, or moves one; takes the last away; joins the last to the
 /// first; begins anew.
 void add_measured_point(const glm::dvec3& point, int replaces, Session& session);

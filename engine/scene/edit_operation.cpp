@@ -41,6 +41,7 @@ SplatSet Edit::meant(const Selector& what, const SplatModel& model) const {
             [&](const by::Haze& h) { return hazy_splats(model, h.opacity, h.size); },
             [&](const by::Near& near) { return grown(model, selected_, near.distance); },
             [&](by::Connected) { return connected(model, selected_, unseen()); },
+            [&](const by::Flood& f) { return flooded(model, f.at, f.within, unseen()); },
             [&](const by::Layer& layer) {
                 return set_of_ranges(layers_[layer_named(layer.name)].splats, n);
             },

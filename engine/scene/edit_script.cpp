@@ -185,6 +185,9 @@ json json_of_selector(const Selector& what) {
             [](by::Connected) -> json {
                 return {{"by", "connected"}};
             },
+            [](const by::Flood& f) -> json {
+                return {{"by", "flood"}, {"at", json_of(f.at)}, {"within", f.within}};
+            },
             [](const by::Layer& l) -> json {
                 return {{"by", "layer"}, {"name", l.name}};
             },
@@ -257,6 +260,10 @@ const SelectorRow kSelectors[] = {
     {"near",
      [](JsonFields& f) -> Selector { return by::Near{f.number("distance", kLeastScale, kMost)}; }},
     {"connected", [](JsonFields&) -> Selector { return by::Connected{}; }},
+    {"flood",
+     [](JsonFields& f) -> Selector {
+         return by::Flood{f.vector("at"), f.number("within", 0, 1)};
+     }},
     {"layer", [](JsonFields& f) -> Selector { return by::Layer{f.text("name")}; }},
     {"numbers", [](JsonFields& f) -> Selector { return by::Numbers{ranges_in(f)}; }},
 };

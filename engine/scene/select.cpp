@@ -253,6 +253,27 @@ SplatSet connected(const SplatModel& model, const SplatSet& mask, const SplatSet
     return result;
 }
 
+SplatSet flooded(const SplatModel& model, const glm::dvec3& at, double within,
+                 const SplatSet& unseen) {
+    const std::size_t n = model.size();
+    DARB_CHECK(unseen.size() == n, "{} splats, {}", n, unseen.size());
+    std::size_t first = n;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < n; ++i) {
+        const double distance = glm::distance(position_of(model, i), at);
+        if (unseen[i] != 0 || !(distance < nearest)) continue;
+        nearest = distance;
+        first = i;
+    }
+    SplatSet seed(n, 0);
+    if (first == n) return seed;
+    seed[first] = 1;
+    SplatSet apart = by_colour(model, glm::clamp(base_colour(model, first), 0.0, 1.0), within);
+    for (std::size_t i = 0; i < n; ++i) apart[i] = apart[i] == 0 || unseen[i] != 0 ? 1 : 0;
+    apart[first] = 0;  // also where its colour is no number
+    return connected(model, seed, apart);
+}
+
 std::vector<SplatRun> ranges_of(const SplatSet& set) {
     std::vector<SplatRun> ranges;
     for (std::size_t i = 0; i < set.size(); ++i) {

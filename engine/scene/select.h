@@ -49,6 +49,12 @@ SplatSet grown(const SplatModel& model, const SplatSet& mask, double distance);
 /// The splats of all parts (parts_of_splats) that have one of the mask; splats of `unseen` connect
 /// nothing.
 SplatSet connected(const SplatModel& model, const SplatSet& mask, const SplatSet& unseen);
+/// The splat whose centre is nearest to `at` (world) and all that hangs together with it: they
+/// touch, or a chain of splats that touch leads to them (parts_of_splats), and in no channel is the
+/// base colour of one farther from the first splat's than `within`, sRGB 0 to 1. Splats of `unseen`
+/// are neither found nor do they connect anything; where there are no others the set is empty.
+SplatSet flooded(const SplatModel& model, const glm::dvec3& at, double within,
+                 const SplatSet& unseen);
 
 /// Splats `first`, `first` + 1 ... of a model, `count` of them.
 struct SplatRun {
@@ -104,6 +110,11 @@ struct Near {
 };
 /// The parts to which the selection belongs.
 struct Connected {};
+/// What touches the splat nearest to a place, or touches what does, in colours like its own.
+struct Flood {
+    glm::dvec3 at{0.0};  // world
+    double within = 0;   // of each channel, sRGB, 0 to 1
+};
 struct Layer {
     std::string name;
 };
@@ -118,6 +129,6 @@ struct Numbers {
 /// One way to say which splats are meant. Region: those whose centre is inside.
 using Selector = std::variant<by::Everything, by::Nothing, Region, by::Rectangle, by::Polygon,
                               by::Brush, by::Opacity, by::Size, by::Colour, by::Isolated, by::Haze,
-                              by::Near, by::Connected, by::Layer, by::Numbers>;
+                              by::Near, by::Connected, by::Flood, by::Layer, by::Numbers>;
 
 }  // namespace darb

@@ -68,6 +68,10 @@ void tool_settings(Session& s) {
     const Command& c = command(
         static_cast<Key>(static_cast<int>(Key::tool_navigate) + static_cast<int>(s.tools.tool)));
     ImGui::TextWrapped("%s: %s", c.name, c.tip);
+    if (s.tools.tool == Tool::flood) {
+        ImGui::SliderFloat("colours", &s.tools.tolerance, 0, 1, "within %.2f", kClamped);
+        tip("How far each channel may be from the colour of the splat that is clicked, 0 to 1");
+    }
     if (s.tools.tool != Tool::brush) return;
     ImGui::SliderFloat("brush", &s.tools.brush_px, 4, 300, "%.0f px", kLogarithmic);
     tip("Radius of the brush on the screen");
@@ -93,8 +97,9 @@ void grow_button(Session& s) {
 }
 
 void selection_buttons(Session& s) {
-    ImGui::Text("%zu selected, %zu hidden, %zu deleted", s.edit.selected_count(),
-                s.edit.hidden_count(), s.edit.removed_count());
+    ImGui::Text("%s selected, %s hidden, %s deleted", count_text(s.edit.selected_count()).c_str(),
+                count_text(s.edit.hidden_count()).c_str(),
+                count_text(s.edit.removed_count()).c_str());
     for (const Key id : {Key::select_all, Key::select_none, Key::select_others}) {
         command_button(id, s);
         ImGui::SameLine();

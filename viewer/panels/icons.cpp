@@ -24,8 +24,10 @@ class Pen {
         list_.AddPolyline(px.data(), static_cast<int>(px.size()), colour_,
                           closed ? ImDrawFlags_Closed : ImDrawFlags_None, width());
     }
+    /// Dear ImGui smooths the edges of a triangle on their outside only if it turns clockwise.
     void fill(const ImVec2& a, const ImVec2& b, const ImVec2& c) {
-        list_.AddTriangleFilled(at(a), at(b), at(c), colour_);
+        const float turn = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+        list_.AddTriangleFilled(at(a), at(turn > 0 ? b : c), at(turn > 0 ? c : b), colour_);
     }
     void dot(const ImVec2& p, float radius) {
         list_.AddCircleFilled(at(p), radius * unit_, colour_);
@@ -89,6 +91,20 @@ void draw_tool(Pen& pen, Icon icon) {
                        {-0.15f, 0.35f},
                        {-0.35f, 0.65f},
                        {-0.1f, 0.9f}});
+            break;
+        case Icon::polygon: {
+            const std::initializer_list<ImVec2> corners{
+                {-0.75f, -0.2f}, {0.1f, -0.8f}, {0.8f, -0.15f}, {0.45f, 0.75f}, {-0.5f, 0.7f}};
+            pen.lines(corners, true);
+            for (const ImVec2& p : corners) pen.dot(p, 0.2f);
+            break;
+        }
+        case Icon::flood:
+            pen.lines({{-0.85f, 0.1f}, {-0.1f, -0.75f}, {0.6f, 0.0f}, {-0.15f, 0.8f}}, true);
+            pen.lines({{-0.1f, -0.75f}, {-0.45f, -0.95f}});
+            pen.fill({-0.85f, 0.1f}, {0.6f, 0.0f}, {-0.15f, 0.8f});
+            pen.dot({0.78f, 0.6f}, 0.2f);
+            pen.fill({0.78f, 0.15f}, {0.97f, 0.55f}, {0.59f, 0.55f});
             break;
         case Icon::brush:
             pen.lines({{0.85f, -0.85f}, {-0.05f, 0.05f}});

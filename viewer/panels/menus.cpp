@@ -28,9 +28,11 @@ constexpr float kButton = 34, kLeastButton = 16, kGap = 3, kInset = 5;  // px at
 
 // What the toolbar has, and where it has a line between groups.
 constexpr std::array kTools{
-    Key::tool_navigate, Key::tool_rectangle, Key::tool_lasso, Key::tool_brush,   Key::tool_sphere,
-    Key::tool_move,     Key::tool_turn,      Key::tool_scale, Key::tool_measure, Key::compare,
-    Key::show_cameras,  Key::show_grid,      Key::play,       Key::undo,         Key::redo};
+    Key::tool_navigate, Key::tool_rectangle, Key::tool_lasso,   Key::tool_polygon,
+    Key::tool_brush,    Key::tool_sphere,    Key::tool_flood,   Key::tool_move,
+    Key::tool_turn,     Key::tool_scale,     Key::tool_measure, Key::compare,
+    Key::show_cameras,  Key::show_grid,      Key::play,         Key::undo,
+    Key::redo};
 constexpr std::array kGroupBegins{Key::tool_rectangle, Key::tool_move, Key::tool_measure,
                                   Key::compare, Key::play};
 

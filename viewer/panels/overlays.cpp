@@ -187,6 +187,16 @@ void draw_stroke(const Session& s, const Camera& camera) {
         for (std::size_t i = 0; i < t.stroke.size(); ++i)
             list.AddLine(point(t.stroke[i]), point(t.stroke[(i + 1) % t.stroke.size()]), kStroke,
                          1.5f);
+    } else if (t.tool == Tool::polygon) {
+        const ImVec2 mouse = ImGui::GetIO().MousePos;
+        std::vector<ImVec2> corners;
+        for (const glm::dvec2& p : t.stroke) corners.push_back(point(p));
+        const bool closes = closes_polygon(s, {mouse.x, mouse.y});
+        corners.push_back(closes ? corners.front() : mouse);
+        list.AddPolyline(corners.data(), static_cast<int>(corners.size()), kStroke, 0, 1.5f);
+        for (const glm::dvec2& p : t.stroke)
+            list.AddCircleFilled(point(p), 3 * s.gui_scale, kStroke);
+        list.AddCircle(first, (closes ? 8.0f : 5.0f) * s.gui_scale, kStroke, 0, 1.5f);
     } else if (t.tool == Tool::sphere && t.sphere) {
         const std::optional<glm::dvec2> at = pixel_of(camera, *t.sphere);
         if (!at) return;

@@ -84,6 +84,7 @@ std::vector<EditOperation> every_edit() {
         Show{},
         Select{by::Numbers{{{3, 2}, {9, 1}}}},
         Select{by::Connected{}, Combine::add},
+        Select{by::Flood{{0.1, 0.2, 0.3}, 0.25}, Combine::add},
         Remove{},
         Remove{Region{Region::Shape::sphere, {2, 2, 2}, glm::dvec3(0.4)}, false},
         Remove{by::Opacity{0.05, 1}, true},

@@ -81,12 +81,17 @@ TEST(Commands, keys_that_people_know_stay) {
 TEST(Commands, number_keys_choose_the_tools_in_their_order) {
     Session s;
     s.scene = std::make_unique<Scene>();
-    for (int t = 0; t < kToolCount; ++t) {
+    for (int t = 0; t <= static_cast<int>(Tool::measure); ++t) {
         const std::optional<Key> key = command_of(std::to_string(t + 1));
         ASSERT_TRUE(key);
         press(*key, s);
         EXPECT_EQ(static_cast<int>(s.tools.tool), t);
         EXPECT_TRUE(command(*key).checked(s));
+    }
+    for (const auto& [chord, tool] : {std::pair{"Shift+3", Tool::polygon}, {"O", Tool::flood}}) {
+        ASSERT_TRUE(command_of(chord)) << chord;
+        press(*command_of(chord), s);
+        EXPECT_EQ(s.tools.tool, tool);
     }
 }
 

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "viewer/commands.h"
+#include "viewer/controls.h"
+#include "viewer/session.h"
 #include "viewer/tools.h"
 #include "viewer/view_camera.h"
 
@@ -116,6 +119,137 @@ TEST(Select, Grown_adds_what_is_near_wherever_the_origin_is) {
     EXPECT_EQ(count(grown(m, mask, 1.5)), 9);
     EXPECT_EQ(count(grown(m, mask, 0.9)), 1);
     EXPECT_EQ(count(grown(m, SplatSet(25, 0), 3)), 0);
+}
+
+// Rows of splats that touch their neighbours. The first row is red up to a gap in its middle, then
+// grey; the second row, too far from the first to touch it, is red.
+SplatModel two_rows() {
+    SplatModel m;
+    m.resize(20);
+    m.origin = {1000, 0, 0};
+    for (size_t i = 0; i < 20; ++i) {
+        m.position[3 * i] = static_cast<float>(i % 10);
+        m.position[3 * i + 1] = i < 10 ? 0.0f : 20.0f;
+        m.rotation[4 * i] = 1;
+        m.opacity_logit[i] = 3;
+        for (size_t c = 0; c < 3; ++c) m.log_scale[3 * i + c] = std::log(0.4f);
+        m.sh_dc[3 * i] = i < 6 || i >= 10 ? 1.7724539f : 0;
+    }
+    return m;
+}
+
+TEST(Select, A_flood_stays_in_touch_and_in_its_colour) {
+    const SplatModel m = two_rows();
+    SplatSet unseen(20, 0);
+    const glm::dvec3 at(1002.1, 0.3, 0);
+    const SplatSet red = flooded(m, at, 0.1, unseen);
+    EXPECT_EQ(count(red), 6) << "not the grey ones, nor those of the other row";
+    EXPECT_EQ(std::accumulate(red.begin(), red.begin() + 6, 0), 6);
+    EXPECT_EQ(count(flooded(m, at, 0.6, unseen)), 10) << "all colours, one row";
+    for (size_t i = 3; i < 5; ++i) unseen[i] = 1;
+    EXPECT_EQ(count(flooded(m, at, 0.1, unseen)), 3) << "what is hidden connects nothing";
+    unseen[2] = 1;
+    EXPECT_EQ(flooded(m, at, 0.1, unseen)[1], 1) << "the nearest that is seen";
+    EXPECT_EQ(count(flooded(m, at, 0.1, SplatSet(20, 1))), 0);
+}
+
+// The pointer as a hand moves it, over a scene of the grid that fills the window.
+class ClickedTools : public ::testing::Test {
+  protected:
+    void SetUp() override {
+        session_.scene = std::make_unique<Scene>();
+        session_.scene->model = grid();
+        session_.edit = Edit(25);
+        session_.panels = true;
+        Session& s = session_;
+        camera_ = camera_in_window(s.photos, s.navigation, free_area(s, 1200, 800));
+    }
+    bool pointer(const glm::dvec2& at, bool down, bool shift = false) {
+        Input in;
+        in.x = at.x;
+        in.y = at.y;
+        in.left = down;
+        in.shift = shift;
+        ControlFrame frame;
+        frame.width = 1200;
+        frame.height = 800;
+        return use_tool(in, frame, session_);
+    }
+    void click(const glm::dvec2& at, bool shift = false) {
+        pointer(at, true, shift);
+        pointer(at, false);
+    }
+    glm::dvec2 seen(size_t splat) const {
+        return *pixel_of(camera_, position_of(session_.scene->model, splat));
+    }
+    Session session_;
+    Camera camera_;
+};
+
+TEST_F(ClickedTools, A_polygon_is_closed_at_its_first_corner) {
+    Session& s = session_;
+    choose_tool(Tool::polygon, s);
+    click({0, 0});
+    click({1200, 0});
+    EXPECT_FALSE(closes_polygon(s, {0, 0})) << "two corners have no inside";
+    click({600, 1});
+    press(Key::remove, s);
+    EXPECT_EQ(s.tools.stroke.size(), 2u) << "the last corner was taken away";
+    click({1200, 800});
+    click({0, 800});
+    EXPECT_TRUE(pointer({300, 300}, false)) << "it goes on while the button is up";
+    EXPECT_EQ(s.edit.selected_count(), 0u);
+    const auto inside =
+        static_cast<std::size_t>(count(in_rectangle(s.scene->model, camera_, {0, 0}, {1200, 800})));
+    click({4, 5});
+    EXPECT_FALSE(s.tools.drawing);
+    EXPECT_GT(inside, 0u);
+    EXPECT_EQ(s.edit.selected_count(), inside);
+    const std::vector<EditOperation> done = s.edit.operations();
+    ASSERT_EQ(done.size(), 1u);
+    const auto& select = std::get<edits::Select>(done[0]);
+    EXPECT_EQ(std::get<by::Polygon>(select.what).outline.size(), 4u);
+    undo_edit(s);
+    EXPECT_EQ(s.edit.selected_count(), 0u);
+}
+
+TEST_F(ClickedTools, A_polygon_is_closed_by_two_clicks_at_one_place_and_cancelled_by_Esc) {
+    Session& s = session_;
+    choose_tool(Tool::polygon, s);
+    for (const glm::dvec2& corner : {glm::dvec2(0, 0), {1200, 0}, {1200, 800}}) click(corner);
+    EXPECT_TRUE(cancel_stroke(s));
+    EXPECT_FALSE(s.tools.drawing);
+    for (const glm::dvec2& corner : {glm::dvec2(0, 0), {1200, 0}, {1200, 800}, {0, 800}})
+        click(corner, true);
+    EXPECT_TRUE(s.tools.drawing);
+    click({1, 799});
+    EXPECT_FALSE(s.tools.drawing);
+    const std::vector<EditOperation> done = s.edit.operations();
+    ASSERT_EQ(done.size(), 1u);
+    EXPECT_EQ(std::get<edits::Select>(done[0]).how, Combine::add)
+        << "as the first click said";
+}
+
+TEST_F(ClickedTools, A_flood_takes_a_click_and_leaves_drags_to_the_camera) {
+    Session& s = session_;
+    for (float& logit : s.scene->model.opacity_logit) logit = 3;
+    for (float& scale : s.scene->model.log_scale) scale = std::log(0.4f);
+    choose_tool(Tool::flood, s);
+    const glm::dvec2 at = seen(13);
+    EXPECT_TRUE(pointer(at, true));
+    EXPECT_FALSE(pointer(at + 30.0, true)) << "this drag turns the view";
+    EXPECT_FALSE(pointer(at + 30.0, false));
+    EXPECT_EQ(s.edit.selected_count(), 0u);
+    click(at);
+    EXPECT_EQ(s.edit.selected_count(), 24u) << "all but the red one";
+    EXPECT_EQ(s.edit.selected()[7], 0);
+    const std::vector<EditOperation> done = s.edit.operations();
+    ASSERT_EQ(done.size(), 1u);
+    const auto& select = std::get<edits::Select>(done[0]);
+    EXPECT_EQ(std::get<by::Flood>(select.what).at, position_of(s.scene->model, 13));
+    s.tools.tolerance = 1;
+    click(at);
+    EXPECT_EQ(s.edit.selected_count(), 25u);
 }
 
 TEST(Gizmo, A_drag_along_an_axis_moves_by_as_much_as_the_hand) {
