@@ -226,8 +226,7 @@ TEST_F(ClickedTools, A_polygon_is_closed_by_two_clicks_at_one_place_and_cancelle
     EXPECT_FALSE(s.tools.drawing);
     const std::vector<EditOperation> done = s.edit.operations();
     ASSERT_EQ(done.size(), 1u);
-    EXPECT_EQ(std::get<edits::Select>(done[0]).how, Combine::add)
-        << "as the first click said";
+    EXPECT_EQ(std::get<edits::Select>(done[0]).how, Combine::add) << "as the first click said";
 }
 
 TEST_F(ClickedTools, A_flood_takes_a_click_and_leaves_drags_to_the_camera) {
