@@ -160,6 +160,7 @@ void Controller::act(int width, int height) {
             painter_->start_search(find.least_views);
         },
         [&](const request::PickPoint& at) { pick(at, width, height); },
+        [&](const request::Flood& from) { flood(from, width, height); },
         [&](const request::OpenMesh& open) { open_mesh(open.file); },
         [&](request::MakeMesh) { make_mesh(); },
         [&](request::SaveMesh) { document_->save_mesh(); },
@@ -262,6 +263,25 @@ void Controller::pick(const request::PickPoint& at, int width, int height) {
     else
         s.tell("There is no surface at this point.");
     painter_->unsettle();
+}
+
+// From the surface that is seen there, not from a faint splat that floats before it.
+void Controller::flood(const request::Flood& from, int width, int height) {
+    Session& s = *session_;
+    document_->need_scene("flood");
+    const Camera camera = camera_in_window(s.photos, s.navigation, free_area(s, width, height));
+    if (camera.lens.active && s.display.effects.lens)
+        throw Error("flood", "the picture is bent by the photo's lens",
+                    "Turn the view a little, which leaves the photo's camera, or turn the effect "
+                    "lens off.");
+    const std::optional<glm::dvec3> point = painter_->surface_at(camera, from.px);
+    painter_->unsettle();
+    if (!point) {
+        s.tell("There is no surface at this point.");
+        return;
+    }
+    const edits::Select select{by::Flood{*point, double{s.tools.tolerance}}, from.combine};
+    darb::show_edit(s.edit.perform(select, s.scene->model), s);
 }
 
 void Controller::take_picture(int width, int height) {

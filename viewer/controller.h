@@ -44,6 +44,7 @@ class Controller {
     void open_mesh(const std::filesystem::path& file);
     void make_mesh();
     void pick(const request::PickPoint& at, int width, int height);
+    void flood(const request::Flood& from, int width, int height);
     void take_picture(int width, int height);
     void quit();
     void leave();

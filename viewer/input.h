@@ -11,6 +11,8 @@
 #include <variant>
 #include <vector>
 
+#include "engine/scene/select.h"
+
 namespace darb {
 
 /// What can be asked for by a key, a menu or a button; commands.h has the table of them.
@@ -141,6 +143,10 @@ struct PickPoint {
     glm::dvec2 px{0.0};  // of the window
     int replaces = -1;   // the measured point that moves there; -1: a new one
 };
+struct Flood {
+    glm::dvec2 px{0.0};  // of the window: selects from the surface that is seen there
+    Combine combine = Combine::replace;
+};
 struct OpenMesh {
     std::filesystem::path file;
 };                   // shows a mesh with the scene
@@ -167,10 +173,10 @@ using Request =
                  request::Open, request::ShowEdits, request::Save, request::SaveScene,
                  request::SaveProject, request::SaveScript, request::SavePage, request::LoadPath,
                  request::SavePath, request::ExportPath, request::CancelLoad,
-                 request::FindFreeSpace, request::CancelWork, request::PickPoint, request::OpenMesh,
-                 request::MakeMesh, request::SaveMesh, request::CloseMesh, request::AskRun,
-                 request::Quit, request::SaveAndLeave, request::Leave, request::Stay,
-                 request::ToggleFullScreen, request::LeaveFullScreen>;
+                 request::FindFreeSpace, request::CancelWork, request::PickPoint, request::Flood,
+                 request::OpenMesh, request::MakeMesh, request::SaveMesh, request::CloseMesh,
+                 request::AskRun, request::Quit, request::SaveAndLeave, request::Leave,
+                 request::Stay, request::ToggleFullScreen, request::LeaveFullScreen>;
 using RequestQueue = std::vector<Request>;
 
 template <class Kind>

@@ -274,7 +274,7 @@ bool use_polygon(const Input& in, const ControlFrame& frame, const Camera& camer
 }
 
 /// A click selects; a drag belongs to the camera.
-bool use_flood(const Input& in, const ControlFrame& frame, const Camera& camera, Session& s) {
+bool use_flood(const Input& in, const ControlFrame& frame, Session& s) {
     ToolState& t = s.tools;
     const glm::dvec2 at(in.x, in.y);
     if (!t.pressed) {
@@ -290,14 +290,7 @@ bool use_flood(const Input& in, const ControlFrame& frame, const Camera& camera,
     t.pressed.reset();
     t.drawing = false;
     if (t.pulled) return false;
-    const std::optional<glm::dvec3> splat =
-        pick(s.scene->model, s.edit.unseen(), camera, pressed.x, pressed.y);
-    if (!splat) {
-        s.tell("There is no splat at this point.");
-        return true;
-    }
-    const by::Flood flood{*splat, double{t.tolerance}};
-    show_edit(s.edit.perform(edits::Select{flood, t.combine}, s.scene->model), s);
+    s.ask(request::Flood{pressed, t.combine});
     return true;
 }
 
@@ -433,7 +426,7 @@ bool use_tool(const Input& in, const ControlFrame& frame, Session& s) {
     const Camera camera = camera_of(s, frame);
     if (t.tool == Tool::polygon) return use_polygon(in, frame, camera, s);
     if (!t.drawing && (frame.panels_want_mouse || !in.left)) return false;
-    if (t.tool == Tool::flood) return use_flood(in, frame, camera, s);
+    if (t.tool == Tool::flood) return use_flood(in, frame, s);
     if (t.tool == Tool::measure) return use_measure(in, frame, camera, s);
     if (has_gizmo(t.tool)) return use_gizmo(in, camera, s);
     if (!t.drawing) {

@@ -262,6 +262,7 @@ SplatSet flooded(const SplatModel& model, const glm::dvec3& at, double within,
     for (std::size_t i = 0; i < n; ++i) {
         const double distance = glm::distance(position_of(model, i), at);
         if (unseen[i] != 0 || !(distance < nearest)) continue;
+        if (sigmoid(double{model.opacity_logit[i]}) < kFloodOpacity) continue;
         nearest = distance;
         first = i;
     }

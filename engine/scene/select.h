@@ -49,6 +49,8 @@ SplatSet grown(const SplatModel& model, const SplatSet& mask, double distance);
 /// The splats of all parts (parts_of_splats) that have one of the mask; splats of `unseen` connect
 /// nothing.
 SplatSet connected(const SplatModel& model, const SplatSet& mask, const SplatSet& unseen);
+/// A flood begins at no splat whose opacity is below this: its colour is hardly seen.
+inline constexpr double kFloodOpacity = 0.1;
 /// The splat whose centre is nearest to `at` (world) and all that hangs together with it: they
 /// touch, or a chain of splats that touch leads to them (parts_of_splats), and in no channel is the
 /// base colour of one farther from the first splat's than `within`, sRGB 0 to 1. Splats of `unseen`

@@ -151,6 +151,13 @@ TEST(Select, A_flood_stays_in_touch_and_in_its_colour) {
     unseen[2] = 1;
     EXPECT_EQ(flooded(m, at, 0.1, unseen)[1], 1) << "the nearest that is seen";
     EXPECT_EQ(count(flooded(m, at, 0.1, SplatSet(20, 1))), 0);
+    SplatModel faint = m;
+    faint.opacity_logit[2] = -3;
+    const glm::dvec3 grey(1006.1, 0.3, 0);
+    EXPECT_EQ(flooded(faint, at, 0.1, SplatSet(20, 0))[1], 1);
+    faint.opacity_logit[6] = -3;
+    faint.sh_dc[3 * 6] = -1.7724539f;
+    EXPECT_EQ(flooded(faint, grey, 0.1, SplatSet(20, 0))[7], 1) << "none that is hardly seen";
 }
 
 // The pointer as a hand moves it, over a scene of the grid that fills the window.
@@ -239,16 +246,12 @@ TEST_F(ClickedTools, A_flood_takes_a_click_and_leaves_drags_to_the_camera) {
     EXPECT_FALSE(pointer(at + 30.0, true)) << "this drag turns the view";
     EXPECT_FALSE(pointer(at + 30.0, false));
     EXPECT_EQ(s.edit.selected_count(), 0u);
+    EXPECT_TRUE(s.requests.empty());
     click(at);
-    EXPECT_EQ(s.edit.selected_count(), 24u) << "all but the red one";
-    EXPECT_EQ(s.edit.selected()[7], 0);
-    const std::vector<EditOperation> done = s.edit.operations();
-    ASSERT_EQ(done.size(), 1u);
-    const auto& select = std::get<edits::Select>(done[0]);
-    EXPECT_EQ(std::get<by::Flood>(select.what).at, position_of(s.scene->model, 13));
-    s.tools.tolerance = 1;
-    click(at);
-    EXPECT_EQ(s.edit.selected_count(), 25u);
+    ASSERT_EQ(s.requests.size(), 1u) << "which the picture's surface answers";
+    const auto& asked = std::get<request::Flood>(s.requests[0]);
+    EXPECT_EQ(asked.px, at);
+    EXPECT_EQ(asked.combine, Combine::replace);
 }
 
 TEST(Gizmo, A_drag_along_an_axis_moves_by_as_much_as_the_hand) {
