@@ -500,7 +500,7 @@ constexpr Command kCommands[] = {
      Menu::tools,
      "Select by flood",
      {"O"},
-     "Click a splat to select it and what touches it in colours like its own; Shift adds, Ctrl "
+     "Click a surface to select its splat and what touches it in like colours; Shift adds, Ctrl "
      "takes away",
      Icon::flood,
      false,

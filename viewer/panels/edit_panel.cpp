@@ -70,7 +70,7 @@ void tool_settings(Session& s) {
     ImGui::TextWrapped("%s: %s", c.name, c.tip);
     if (s.tools.tool == Tool::flood) {
         ImGui::SliderFloat("colours", &s.tools.tolerance, 0, 1, "within %.2f", kClamped);
-        tip("How far each channel may be from the colour of the splat that is clicked, 0 to 1");
+        tip("How far each channel may be from the colour of the first splat, 0 to 1");
     }
     if (s.tools.tool != Tool::brush) return;
     ImGui::SliderFloat("brush", &s.tools.brush_px, 4, 300, "%.0f px", kLogarithmic);
