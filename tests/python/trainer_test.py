@@ -44,7 +44,7 @@ OTHER = {
     "densification_interval": 2, "densify_grad_threshold": 0.0003, "percent_dense": 0.02,
     "prune_opacity": 0.01, "opacity_reset_interval": 4, "noise_lr": 1000.0,
     "morton_order": True, "opacity_reg": 0.02, "scale_reg": 0.03, "largest_scale": 0.5,
-    "clearance": 0.25, "random_points": 700}
+    "clearance": 0.25, "random_points": 700, "roi": "subject:1.5"}
 
 
 def words(options):
@@ -171,7 +171,7 @@ class Training(unittest.TestCase):
     @unittest.skipUnless(os.path.exists(support.COMMAND), "the command is not built")
     def test_every_option_comes_to_what_the_command_makes_of_it(self):
         usual = darb.Trainer(SCENE, resolution=32).options
-        self.assertEqual(set(OTHER) | {"render_scale", "start_checkpoint"}, set(usual))
+        self.assertEqual(set(OTHER) | {"render_scale", "start_checkpoint", "points"}, set(usual))
         switches = {"random_background": "--fixed-background"}
         for strategy, left_out in (("adc", {"noise_lr", "exposure_grid"}),
                                    ("mcmc", {"schedule", "densify_grad_threshold", "percent_dense",
@@ -227,6 +227,9 @@ class Training(unittest.TestCase):
                               ("output: is an option of the command alone", {"output": "x"}),
                               ("model_path: is an option of the command", {"model_path": "x"}),
                               ("view: is an option of the command alone", {"view": True}),
+                              ("drop_outside: is an option of the command alone",
+                               {"roi": "subject", "drop_outside": True}),
+                              ("clean_haze: is an option of the command", {"clean_haze": "0.1,5"}),
                               ("kernel: is of the type bool", {"kernel": True}),
                               ("--seed: has an empty value", {"seed": ""}),
                               ("strategy", {"strategy": "none"}),
