@@ -220,6 +220,19 @@ class Training(unittest.TestCase):
         self.assertTrue(2 < at < 29000)
         self.assertEqual(trainer.step(1)["iteration"], at + 1)
 
+    def test_points_of_a_file_are_where_it_starts(self):
+        few = self.path / "few.ply"
+        start = self.trained().scene()
+        place = start.means[:5] + np.array(start.origin)
+        few.write_text("ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+                       "property float z\nend_header\n"
+                       + "".join("{} {} {}\n".format(*p) for p in place))
+        self.assertEqual(len(self.trained(points=few).scene()), 5)
+        read = darb.Dataset.read(SCENE, resolution=32)
+        self.assertEqual(len(darb.Trainer(read, points=few).scene()), 5)
+        with self.assertRaisesRegex(darb.Error, "none.ply"):
+            self.trained(points=self.path / "none.ply")
+
     def test_mistakes_are_errors_of_the_command(self):
         for text, options in (("--kernel foo: no such kernel", {"kernel": "foo"}),
                               ("--iterations", {"iterations": -5}),

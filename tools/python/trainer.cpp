@@ -36,6 +36,7 @@ Dataset take_dataset(const py::object& given, const py::dict& options,
         const py::gil_scoped_release free;
         dataset = load_dataset(request.dataset, request.data);
     }
+    if (!request.points.empty()) replace_points(request.points, dataset);
     if (!dataset.options.hold_out)
         for (View& view : dataset.views) view.is_test = false;
     return dataset;
