@@ -26,6 +26,16 @@ fs::path free_picture_name() {
     }
 }
 
+constexpr const char* kNoSurface = "There is no surface at this point.";
+
+/// Surfaces are found in straight pictures.
+void refuse_bent(const Camera& camera, const char* what, const Session& s) {
+    if (camera.lens.active && s.display.effects.lens)
+        throw Error(what, "the picture is bent by the photo's lens",
+                    "Turn the view a little, which leaves the photo's camera, or turn the effect "
+                    "lens off.");
+}
+
 template <class... Kinds>
 struct ByKind : Kinds... {
     using Kinds::operator()...;
@@ -252,16 +262,13 @@ void Controller::pick(const request::PickPoint& at, int width, int height) {
     const bool on_mesh = s.mesh && s.display.mesh != MeshShow::none;
     std::optional<glm::dvec3> point;
     if (on_mesh) point = point_on_mesh(s.mesh->mesh, camera, double{s.display.near_plane}, at.px);
-    if (!on_mesh && camera.lens.active && s.display.effects.lens)
-        throw Error("measuring", "the picture is bent by the photo's lens",
-                    "Turn the view a little, which leaves the photo's camera, or turn the effect "
-                    "lens off.");
+    if (!on_mesh) refuse_bent(camera, "measuring", s);
     if (!point && !(on_mesh && s.display.mesh == MeshShow::alone))
         point = painter_->surface_at(camera, at.px);
     if (point)
         add_measured_point(*point, at.replaces, s);
     else
-        s.tell("There is no surface at this point.");
+        s.tell(kNoSurface);
     painter_->unsettle();
 }
 
@@ -270,18 +277,14 @@ void Controller::flood(const request::Flood& from, int width, int height) {
     Session& s = *session_;
     document_->need_scene("flood");
     const Camera camera = camera_in_window(s.photos, s.navigation, free_area(s, width, height));
-    if (camera.lens.active && s.display.effects.lens)
-        throw Error("flood", "the picture is bent by the photo's lens",
-                    "Turn the view a little, which leaves the photo's camera, or turn the effect "
-                    "lens off.");
-    const std::optional<glm::dvec3> point = painter_->surface_at(camera, from.px);
-    painter_->unsettle();
-    if (!point) {
-        s.tell("There is no surface at this point.");
-        return;
+    refuse_bent(camera, "flood", s);
+    if (const auto point = painter_->surface_at(camera, from.px)) {
+        const edits::Select select{by::Flood{*point, double{s.tools.tolerance}}, from.combine};
+        darb::show_edit(s.edit.perform(select, s.scene->model), s);
+    } else {
+        s.tell(kNoSurface);
     }
-    const edits::Select select{by::Flood{*point, double{s.tools.tolerance}}, from.combine};
-    darb::show_edit(s.edit.perform(select, s.scene->model), s);
+    painter_->unsettle();
 }
 
 void Controller::take_picture(int width, int height) {

@@ -20,9 +20,9 @@ struct PageNote {
 };
 
 /// Reads {"notes": [{"at": [x, y, z], "title": "...", "text": "...", "camera": {...}}]}. A title is
-/// needed or a text; a camera is a record of cameras.json, without its name, or
-/// has the form of a project's notes (docs/formats.md). Other members are
-/// ignored. Throws Error naming the note, and for more than 1,000 of them.
+/// needed or a text; a camera is a record of cameras.json, without its name, or has the
+/// form of a project's notes (docs/formats.md). Other members are ignored. Throws Error naming the
+/// note, and for more than 1,000 of them.
 std::vector<PageNote> read_page_notes(const std::filesystem::path& path);
 
 }  // namespace darb

@@ -54,7 +54,7 @@ inline constexpr double kFloodOpacity = 0.1;
 /// The splat whose centre is nearest to `at` (world) and all that hangs together with it: they
 /// touch, or a chain of splats that touch leads to them (parts_of_splats), and in no channel is the
 /// base colour of one farther from the first splat's than `within`, sRGB 0 to 1. Splats of `unseen`
-/// are neither found nor do they connect anything; where there are no others the set is empty.
+/// are neither found nor do they connect anything. The set is empty where no splat can be first.
 SplatSet flooded(const SplatModel& model, const glm::dvec3& at, double within,
                  const SplatSet& unseen);
 

@@ -75,8 +75,7 @@ struct ShutterGradient {
 };
 
 // dL/dp at a held time, from the gradients of the pixel and of the Jacobian's rows. j: these rows after add_shutter; k:
-// before it. d_shear: of the
-// offsets of sigma points.
+// before it. d_shear: dL/d(the shear of sigma points' offsets).
 vec3 shutter_point_gradient(CameraData camera, ShutterMotion m, vec3 p, mat2x3 k, mat2x3 j, mat2x3 d_j, vec2 d_pixel,
                             vec2 d_shear, out ShutterGradient g) {
     vec2 along = vec2(dot(d_j[0], k[1]), dot(d_j[1], k[1]));
