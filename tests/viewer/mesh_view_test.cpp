@@ -373,6 +373,23 @@ TEST_F(MeshView, Clicks_measure_on_the_splats_and_give_the_scale) {
     EXPECT_EQ(session().edit.removed_count(), 0u);
 }
 
+TEST_F(MeshView, A_flood_begins_at_the_surface_and_not_at_what_floats_before_it) {
+    load_layers();
+    session().panels = true;
+    session().gui_scale = 0.01f;
+    session().navigation.centre_x = 0.5;
+    Input tool;
+    tool.pressed = {Key::tool_flood};
+    frame(tool);
+    // Beside red's centre, where less than half of the light stops at red.
+    click(*pixel_of(camera(), {0, 0, -1}) + glm::dvec2(5, 0));
+    const Edit& edit = session().edit;
+    ASSERT_EQ(edit.selected_count(), 1u) << session().error << session().note;
+    EXPECT_EQ(edit.selected()[1], 1) << "blue, though red's centre is nearer to the eye";
+    const auto& flood = std::get<by::Flood>(std::get<edits::Select>(edit.operations()[0]).what);
+    EXPECT_NEAR(flood.at.z, 1, 0.1);
+}
+
 TEST_F(MeshView, Clicks_measure_on_the_mesh_where_it_is_shown) {
     load_layers();
     drop(wall(0));
