@@ -74,6 +74,11 @@ check "its checkpoint goes" "^gone$" "$([[ ! -e $folder/out/runs/long-adc-8-seed
 
 output=$(table --sets town_1200 --iterations 8 --strategies adc --make-scene "$folder/none")
 check "what makes a set is not built" "^town_1200: skipped, as $folder/out/sets/town_1200 is not there, which $folder/none" "$output"
+printf '#!/bin/sh\nsleep 100\n' >"$folder/slow"
+chmod +x "$folder/slow"
+output=$(table --sets town_1200 --iterations 8 --strategies adc --make-scene "$folder/slow" --limit 6)
+check "the time may end while it is made" "^town_1200: the time was over before its photos were made; a larger" "$output"
+check "and nothing is trained" "^1 of 1 runs are left" "$output"
 cat >"$folder/make_scene" <<'TEXT'
 #!/bin/sh
 echo "$@" >>"${0%/*}/made"

@@ -15,7 +15,8 @@ page  prints a Markdown table, with two files the rows of both below each other 
 --out         runs and results; default: build/real_scale. Finished runs keep their scene and lose their checkpoint.
 --limit       seconds that the whole call may take; default: 540.
 --make-scene  the program that makes still_life_1200 and town_1200 (36 photos), and town_1200_large (225 photos) where
-              that is asked for, in DIR/sets; default: build/make_scene, which the preset lab builds.
+              that is asked for, in DIR/sets; default: build/make_scene, which the preset lab builds. A photo of the
+              town takes 45 s of one core, so the large one needs a larger --limit.
 --reduced     the table for a CPU: photos at most PX wide (default 400), 2,000 iterations, adc and budget, three sets.
 --data        the folder of the sets; default: ../shared/data beside the checkout, or DARB_TEST_DATA.
 --darb        the command to run; default: build/darb of this checkout.
@@ -151,11 +152,14 @@ class Table:
         given = self.args.data / name
         return self.out / "sets" / name if name in GENERATED and not given.is_dir() else given
 
+    def can_have(self, name):
+        return self.data_of(name).is_dir() or name in GENERATED and os.access(self.args.make_scene, os.X_OK)
+
     def make(self, name):
-        """Generates a set, which appears once it is whole."""
+        """Generates a set that is not there yet, and which appears once it is whole. -> False where the time is over"""
         folder = self.data_of(name)
-        if name not in GENERATED or folder.is_dir() or not os.access(self.args.make_scene, os.X_OK):
-            return
+        if folder.is_dir():
+            return True
         beside = folder.with_name(name + ".tmp")
         shutil.rmtree(beside, ignore_errors=True)
         beside.parent.mkdir(parents=True, exist_ok=True)
@@ -166,11 +170,12 @@ class Table:
                                   timeout=max(self.left(), 0.1))
         except subprocess.TimeoutExpired:
             say(f"{name}: the time was over before its photos were made; a larger --limit makes them")
-            return
+            return False
         if done.returncode != 0:
             fail(f"{self.args.make_scene} {' '.join(words)}: exit code {done.returncode}: {done.stderr.strip()[:300]}")
         beside.rename(folder)
         say(f"{name}: made in {time.monotonic() - begun:.0f} s")
+        return True
 
     def command(self, run, folder):
         if (folder / "checkpoint.darb").exists():
@@ -252,16 +257,13 @@ class Table:
         return row is not None and not ("error" in row and self.args.again_failed)
 
     def execute(self):
-        for name in self.args.sets:
-            if any(run["set"] == name and not self.is_done(run) for run in self.runs()):
-                self.make(name)
-        missing = [name for name in self.args.sets if not self.data_of(name).is_dir()]
+        missing = [name for name in self.args.sets if not self.can_have(name)]
         for name in missing:
             why = f", which {self.args.make_scene} would make" if name in GENERATED else ""
             say(f"{name}: skipped, as {self.data_of(name)} is not there{why}")
         todo = [run for run in self.runs() if run["set"] not in missing and not self.is_done(run)]
         for place, run in enumerate(todo):
-            if self.left() < LEAST_SECONDS or not self.do(run):
+            if self.left() < LEAST_SECONDS or not self.make(run["set"]) or not self.do(run):
                 say(f"{len(todo) - place} of {len(todo)} runs are left; the same command goes on with them")
                 break
         else:
