@@ -254,9 +254,12 @@ void paint(Device& device, const SceneMeshOptions& options, const std::vector<st
         const PhotoPainting painting(result, names, *photos, progress);
         tell_progress(progress, "choice of photos");
         const PhotoChoice choice = choose_photos(mesh, painting.views());
-        paint_with_photos(mesh, painting.views(), choice, kGutter, texture);
+        SeamLevels levels;
+        if (options.level_seams) levels = level_seams(mesh, painting.views(), choice);
+        paint_with_photos(mesh, painting.views(), choice, levels, kGutter, texture);
         report.texture->unseen_faces = choice.unseen;
         report.texture->seams = choice.seams;
+        if (options.level_seams) report.texture->seam_levels = {levels.before, levels.after};
     } else {
         paint_texture(
             mesh,

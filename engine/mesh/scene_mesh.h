@@ -51,7 +51,8 @@ struct SceneMeshOptions {
     std::size_t keep = 0, min_island = 50;
     double fill_holes = 0;  // longest rim that is closed, world units; 0: off
     MeshTexturing texture = MeshTexturing::vertex;
-    double texel = 0;  // side, world units; 0: half a voxel
+    double texel = 0;         // side, world units; 0: half a voxel
+    bool level_seams = true;  // between photos
     EffectChoice effects;
 };
 
@@ -67,6 +68,8 @@ struct TextureReport {
     std::size_t pages = 0;
     double texel = 0;                         // world units
     std::size_t unseen_faces = 0, seams = 0;  // of photos
+    // Mean difference of the photos along seams, 8-bit levels, before they were levelled and after.
+    std::optional<std::array<double, 2>> seam_levels = std::nullopt;
 };
 
 struct SceneMeshReport {

@@ -519,19 +519,39 @@ class Labelling {
     std::vector<std::uint32_t> view;                 // [F]
 };
 
-glm::u8vec3 bilinear(const ImageU8& photo, double px, double py) {
+dvec3 bilinear(const ImageU8& photo, double px, double py) {
     const double x = std::clamp(px - 0.5, 0.0, photo.width - 1.0),
                  y = std::clamp(py - 0.5, 0.0, photo.height - 1.0);
     const int x0 = int(x), y0 = int(y), x1 = std::min(x0 + 1, photo.width - 1),
               y1 = std::min(y0 + 1, photo.height - 1);
     const double u = x - x0, v = y - y0;
-    glm::u8vec3 colour;
+    dvec3 colour;
     for (int c = 0; c < 3; ++c) {
         const double top = (1 - u) * photo.at(x0, y0, c) + u * photo.at(x1, y0, c),
                      bottom = (1 - u) * photo.at(x0, y1, c) + u * photo.at(x1, y1, c);
-        colour[c] = static_cast<std::uint8_t>(std::lround((1 - v) * top + v * bottom));
+        colour[c] = (1 - v) * top + v * bottom;
     }
     return colour;
+}
+
+/// What is added to the photo at a point of a face, between the face's corners.
+dvec3 added_at(const TriangleMesh& mesh, const SeamLevels& levels, const SurfacePoint& point) {
+    if (levels.added.empty()) return dvec3(0.0);
+    const auto& face = mesh.face[point.face];
+    const dvec3 normal = face_cross(mesh, point.face), p(point.position);
+    const double area = glm::dot(normal, normal);
+    if (!(area > 0)) return dvec3(levels.added[point.face][0]);
+    dvec3 sum(0.0);
+    for (std::size_t c = 0; c < 3; ++c) {
+        const dvec3 a(mesh.position[face[(c + 1) % 3]]), b(mesh.position[face[(c + 2) % 3]]);
+        const double weight = glm::dot(glm::cross(a - p, b - p), normal) / area;
+        sum += weight * dvec3(levels.added[point.face][c]);
+    }
+    return sum;
+}
+
+glm::u8vec3 in_levels(const dvec3& colour) {
+    return glm::u8vec3(glm::round(glm::clamp(colour, 0.0, 255.0)));
 }
 
 /// The colour of the face's vertices, weighted by how near they are; grey without any.
@@ -601,8 +621,15 @@ PhotoChoice choose_photos(const TriangleMesh& mesh, const PhotoViews& views, dou
     return choice;
 }
 
+std::optional<dvec3> photo_colour(const Camera& camera, const ImageU8& photo,
+                                  const TriangleMesh& mesh, const glm::vec3& point) {
+    const auto pixel = projected(camera, world_of(mesh, point));
+    if (!pixel) return std::nullopt;
+    return bilinear(photo, pixel->x, pixel->y);
+}
+
 void paint_with_photos(const TriangleMesh& mesh, const PhotoViews& views, const PhotoChoice& choice,
-                       int gutter, MeshTexture& texture) {
+                       const SeamLevels& levels, int gutter, MeshTexture& texture) {
     Painter painter(mesh, texture);
     std::vector<bool> chosen(views.cameras.size(), false);
     for (const std::uint32_t view : choice.view)
@@ -610,14 +637,14 @@ void paint_with_photos(const TriangleMesh& mesh, const PhotoViews& views, const 
     for (std::uint32_t view = 0; view < chosen.size(); ++view) {
         if (!chosen[view]) continue;
         const ImageU8 photo = views.photo(view);
-        const Camera& camera = views.cameras[view];
-        painter.paint(
-            [&](std::uint32_t f) { return choice.view[f] == view; },
-            [&](std::span<const SurfacePoint> points, std::span<glm::u8vec3> colours) {
-                for (std::size_t i = 0; i < points.size(); ++i)
-                    if (const auto pixel = projected(camera, world_of(mesh, points[i].position)))
-                        colours[i] = bilinear(photo, pixel->x, pixel->y);
-            });
+        painter.paint([&](std::uint32_t f) { return choice.view[f] == view; },
+                      [&](std::span<const SurfacePoint> points, std::span<glm::u8vec3> colours) {
+                          for (std::size_t i = 0; i < points.size(); ++i)
+                              if (const auto colour = photo_colour(views.cameras[view], photo, mesh,
+                                                                   points[i].position))
+                                  colours[i] =
+                                      in_levels(*colour + added_at(mesh, levels, points[i]));
+                      });
     }
     painter.paint([&](std::uint32_t f) { return choice.view[f] == kNoPhoto; },
                   [&](std::span<const SurfacePoint> points, std::span<glm::u8vec3> colours) {

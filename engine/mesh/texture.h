@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 // A texture for a mesh: flat charts on pages, painted by any source of colours or with photos, one
-// a face. Source of the choice of photos: Waechter et al. 2014 (their data and smoothness terms;
-// seams are not levelled).
+// a face. Source: Waechter et al. 2014, for the choice of photos (their data and smoothness terms)
+// and the levelling of seams (their global step).
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -68,9 +70,26 @@ struct PhotoChoice {
 PhotoChoice choose_photos(const TriangleMesh& mesh, const PhotoViews& views,
                           double smoothing = 3.0);
 
-/// Paints each face with its photo, one photo after the other. Faces without one get the colours of
-/// their vertices, or grey where the mesh has none.
+/// The colour that a photo shows at a point in the mesh's frame, between its pixels; nothing behind
+/// the camera.
+std::optional<glm::dvec3> photo_colour(const Camera& camera, const ImageU8& photo,
+                                       const TriangleMesh& mesh, const glm::vec3& point);
+
+/// What is added to the photos' colours so that they meet where one ends and the next begins:
+/// smooth over the faces of a photo, in 8-bit levels of sRGB.
+struct SeamLevels {
+    std::vector<std::array<glm::vec3, 3>> added;  // [F] at the face's corners; empty: nothing
+    double before = 0, after = 0;  // mean difference of the two photos along seams, levels
+};
+/// Least squares over all seams at once (Lempitsky and Ivanov 2007). Differences that are too large
+/// for one of exposure count less. Reads each photo that has a seam once. Throws Error where the
+/// choice is for another number of faces.
+SeamLevels level_seams(const TriangleMesh& mesh, const PhotoViews& views,
+                       const PhotoChoice& choice);
+
+/// Paints each face with its photo and what is added to that, one photo after the other. Faces
+/// without one get the colours of their vertices, or grey where the mesh has none.
 void paint_with_photos(const TriangleMesh& mesh, const PhotoViews& views, const PhotoChoice& choice,
-                       int gutter, MeshTexture& texture);
+                       const SeamLevels& levels, int gutter, MeshTexture& texture);
 
 }  // namespace darb

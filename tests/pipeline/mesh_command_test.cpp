@@ -282,7 +282,8 @@ std::map<std::array<int, 3>, std::size_t> colours_of(const std::vector<fs::path>
 TEST(MeshCommand, Paints_pages_with_photos) {
     const std::string report = scratch_file("painted.json");
     const std::string command = fmt::format(
-        "mesh '{}' --cameras '{}' -o '{}' --voxel 0.1 --texel 0.02 --texture photos --json {}",
+        "mesh '{}' --cameras '{}' -o '{}' --voxel 0.1 --texel 0.02 --texture photos --seams keep "
+        "--json {}",
         ball_file().string(), data_set(), scratch_file("painted.obj"), report);
     const Outcome o = darb(command);
     ASSERT_EQ(o.code, 0) << o.err;
@@ -309,6 +310,24 @@ TEST(MeshCommand, Paints_pages_with_photos) {
               0.02 * double(read_json(report)["faces"]));
 }
 
+TEST(MeshCommand, Levels_the_seams_between_photos) {
+    const std::string report = scratch_file("levelled.json");
+    const auto painted = [&](const std::string& more) {
+        return darb(fmt::format(
+            "mesh '{}' --cameras '{}' -o '{}' --voxel 0.1 --texel 0.02 --json {} {}",
+            ball_file().string(), data_set(), scratch_file("levelled.obj"), report, more));
+    };
+    const Outcome o = painted("--texture photos");
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("seams: photos differ by"), std::string::npos) << o.out;
+    const auto levels = read_json(report)["texture"]["seam_levels"];
+    EXPECT_GT(double(levels["before"]), 5) << "photos of one colour each";
+    EXPECT_LT(double(levels["after"]), 0.5 * double(levels["before"]));
+    const Outcome refused = painted("--texture splats --seams keep");
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_NE(refused.err.find("--texture photos"), std::string::npos) << refused.err;
+}
+
 TEST(MeshCommand, Undoes_the_exposures_that_the_run_learned) {
     const fs::path run = scratch() / "run";
     fs::create_directories(run);
@@ -325,9 +344,9 @@ TEST(MeshCommand, Undoes_the_exposures_that_the_run_learned) {
         undone.insert({back(2 * std::max(c.x - 5.1, 0.0)), back(2.0 * c.y), back(2.0 * c.z)});
     }
     write_file_atomic(run / "exposure.json", maps.dump());
-    const std::string command =
-        fmt::format("mesh '{}' --cameras '{}' -o '{}' --voxel 0.1 --texel 0.02 --texture photos",
-                    (run / "ball.ply").string(), data_set(), scratch_file("exposed.obj"));
+    const std::string command = fmt::format(
+        "mesh '{}' --cameras '{}' -o '{}' --voxel 0.1 --texel 0.02 --texture photos --seams keep",
+        (run / "ball.ply").string(), data_set(), scratch_file("exposed.obj"));
     const Outcome o = darb(command);
     ASSERT_EQ(o.code, 0) << o.err;
     std::size_t photos = 0, others = 0;

@@ -48,6 +48,7 @@ constexpr double kManyThin = 0.01;      // of the blocks with a surface: worth a
 struct MeshFlags {
     std::filesystem::path scene, cameras, output, json, paper;
     std::string method = "tsdf", reading, bounds, max_memory, texture = "vertex", device;
+    std::string seams = "level";
     std::string effects = "auto", collider, capsule, up, align;
     bool force = false, quiet = false;
     SceneMeshOptions mesh;
@@ -298,6 +299,9 @@ nlohmann::json report_json(const MeshFlags& flags, const SceneMesh& result,
         if (flags.mesh.texture == MeshTexturing::photos) {
             json["texture"]["unseen_faces"] = r.texture->unseen_faces;
             json["texture"]["seams"] = r.texture->seams;
+            if (const auto& levels = r.texture->seam_levels)
+                json["texture"]["seam_levels"] = {{"before", (*levels)[0]},
+                                                  {"after", (*levels)[1]}};
         }
     }
     return json;
@@ -328,6 +332,9 @@ std::string report_text(const MeshFlags& flags, const SceneMesh& result, double 
         text += fmt::format("; {:.1f} % of the faces are in no photo and have the splats' colours",
                             100 * share(r.texture->unseen_faces, result.mesh.face_count()));
     if (r.texture) text += "\n";
+    if (r.texture && r.texture->seam_levels)
+        text += fmt::format("seams: photos differ by {:.1f} of 255 levels there, levelled {:.1f}\n",
+                            (*r.texture->seam_levels)[0], (*r.texture->seam_levels)[1]);
     return text + fmt::format("{} vertices, {} faces\n", result.mesh.vertex_count(),
                               result.mesh.face_count());
 }
@@ -468,6 +475,9 @@ void check_output(const MeshFlags& flags) {
         flags.output.extension().empty())
         throw Error(flags.output.string(), "has no ending of a mesh",
                     "Use " + mesh_endings() + ".");
+    if (flags.mesh.texture != MeshTexturing::photos && flags.seams != "level")
+        throw Error("--seams " + flags.seams, "only photos have seams",
+                    "Add --texture photos, or leave --seams out.");
     if (has_pages(flags.mesh.texture) && has_extension(flags.output, ".ply"))
         throw Error(flags.output.string(), "a .ply has no place for a texture",
                     "Write .glb, .gltf or .obj, or take --texture vertex.");
@@ -590,6 +600,13 @@ void add_cleaning_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
             ->default_str("half a voxel")
             ->check(above_zero())
             ->needs(texture));
+    groups.surface.push_back(
+        c.add_option("--seams", flags.seams,
+                     "where one photo ends and the next begins: level changes the colours of both "
+                     "smoothly until they meet; keep leaves them as they were taken")
+            ->capture_default_str()
+            ->check(CLI::IsMember({"level", "keep"}))
+            ->needs(texture));
 }
 
 void add_reference_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
@@ -663,6 +680,7 @@ void add_mesh(CLI::App& app, Action& action) {
     add_unit_options(*command, flags->units);
     command->callback([flags, &action] {
         flags->mesh.texture = *mesh_texturing_from_name(flags->texture);
+        flags->mesh.level_seams = flags->seams == "level";
         flags->reference.align = align_kind_from_name(flags->align);
         action = [flags] { return mesh(*flags); };
     });

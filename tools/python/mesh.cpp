@@ -97,6 +97,10 @@ SceneMeshOptions take_options(const py::dict& options, const glm::dvec3& origin,
     o.min_island = count_or_0(options, "min_island");
     o.fill_holes = length_or_0(options, "fill_holes");
     o.texel = length_or_0(options, "texel");
+    const std::string seams = take_text(options["seams"], "seams");
+    if (seams != "level" && seams != "keep")
+        throw Error("seams " + seams, "no such way", "Use level or keep.");
+    o.level_seams = seams == "level";
     return o;
 }
 

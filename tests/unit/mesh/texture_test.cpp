@@ -268,7 +268,7 @@ TEST(PaintWithPhotos, texels_are_what_the_photo_shows_there) {
     for (Camera& camera : views.cameras) camera.translation -= camera.rotation * dvec3(100, 0, 0);
     const PhotoChoice choice = choose_photos(mesh, views);
     MeshTexture texture = unwrap_mesh(mesh, {.texel = 0.02});
-    paint_with_photos(mesh, views, choice, 4, texture);
+    paint_with_photos(mesh, views, choice, {}, 4, texture);
     for (std::size_t f = 0; f < mesh.face_count(); f += 7) {
         const std::size_t view = choice.view[f];
         ASSERT_NE(view, kNoPhoto);
@@ -289,11 +289,100 @@ TEST(PaintWithPhotos, texels_are_what_the_photo_shows_there) {
     // Without a photo: vertices' colours, else grey.
     PhotoChoice none = choice;
     std::fill(none.view.begin(), none.view.end(), kNoPhoto);
-    paint_with_photos(mesh, views, none, 4, texture);
+    paint_with_photos(mesh, views, none, {}, 4, texture);
     EXPECT_EQ(texture.image[0].at(30, 30, 1), 128);
     mesh.colour.assign(mesh.vertex_count(), glm::u8vec3(1, 2, 3));
-    paint_with_photos(mesh, views, none, 4, texture);
+    paint_with_photos(mesh, views, none, {}, 4, texture);
     EXPECT_EQ(texture.image[0].at(30, 30, 1), 2);
+}
+
+/// Two photos from above, one of the left half of a square and one of the right half: grey that
+/// brightens along y. `by` is added to the right one.
+struct Halves {
+    TriangleMesh mesh = square_around_0(32);
+    PhotoViews views = views_of_square();
+    PhotoChoice choice;
+
+    explicit Halves(int by) {
+        views.cameras.resize(2);
+        views.cameras[1] = views.cameras[0];
+        views.photo = [by](std::size_t view) {
+            ImageU8 photo(200, 150, 3);
+            for (int y = 0; y < photo.height; ++y)
+                for (int x = 0; x < photo.width; ++x)
+                    for (int c = 0; c < 3; ++c)
+                        photo.at(x, y, c) =
+                            static_cast<std::uint8_t>(60 + y / 2 + (view == 1 ? by * (c + 1) : 0));
+            return photo;
+        };
+        for (const auto& face : mesh.face) {
+            float x = 0;
+            for (const std::uint32_t v : face) x += mesh.position[v].x;
+            choice.view.push_back(x < 0 ? 0 : 1);
+        }
+    }
+};
+
+TEST(LevelSeams, photos_of_two_exposures_meet) {
+    const Halves halves(12);
+    const SeamLevels levels = level_seams(halves.mesh, halves.views, halves.choice);
+    EXPECT_NEAR(levels.before, 24, 0.5) << "12, 24 and 36 in the three colours";
+    EXPECT_LT(levels.after, 0.05 * levels.before);
+    EXPECT_EQ(level_seams(halves.mesh, halves.views, halves.choice).added, levels.added);
+    double steepest = 0;
+    for (const auto& corners : levels.added)
+        for (std::size_t c = 0; c < 3; ++c)
+            steepest = std::max(steepest, double(std::abs(corners[c].z - corners[(c + 1) % 3].z)));
+    EXPECT_LT(steepest, 3) << "36 levels spread over the faces of both photos";
+
+    MeshTexture texture = unwrap_mesh(halves.mesh, {.texel = 0.02});
+    MeshTexture raw = texture;
+    paint_with_photos(halves.mesh, halves.views, halves.choice, levels, 4, texture);
+    paint_with_photos(halves.mesh, halves.views, halves.choice, {}, 4, raw);
+    const auto step = [](const ImageU8& page) {  // across the middle, at half the height
+        const int x = page.width / 2, y = page.height / 2;
+        return std::abs(page.at(x + 1, y, 2) - page.at(x - 2, y, 2));
+    };
+    EXPECT_NEAR(step(raw.image[0]), 36, 1);
+    EXPECT_LE(step(texture.image[0]), 3);
+}
+
+TEST(LevelSeams, photos_that_agree_stay_as_they_are) {
+    const Halves halves(0);
+    const SeamLevels levels = level_seams(halves.mesh, halves.views, halves.choice);
+    EXPECT_LT(levels.before, 1e-9);
+    for (const auto& corners : levels.added)
+        for (const glm::vec3& added : corners) EXPECT_LT(glm::length(added), 1e-6f);
+    // A mesh of one photo, and one of none, have no seams.
+    PhotoChoice one = halves.choice;
+    for (const std::uint32_t view : {0u, kNoPhoto}) {
+        std::fill(one.view.begin(), one.view.end(), view);
+        EXPECT_TRUE(level_seams(halves.mesh, halves.views, one).added.empty());
+    }
+    PhotoChoice shorter = halves.choice;
+    shorter.view.pop_back();
+    EXPECT_THROW(level_seams(halves.mesh, halves.views, shorter), Error);
+}
+
+// What differs by more than exposures do is another thing in the photo, and bends less.
+TEST(LevelSeams, large_differences_count_less) {
+    const Halves halves(12);
+    Halves torn(12);
+    const auto photo = torn.views.photo;
+    torn.views.photo = [photo](std::size_t view) {
+        ImageU8 torn_photo = photo(view);
+        if (view == 1)  // a tenth of the seam shows something white
+            for (int y = 70; y < 80; ++y)
+                for (int x = 0; x < torn_photo.width; ++x)
+                    for (int c = 0; c < 3; ++c) torn_photo.at(x, y, c) = 255;
+        return torn_photo;
+    };
+    const SeamLevels clean = level_seams(halves.mesh, halves.views, halves.choice);
+    const SeamLevels bent = level_seams(torn.mesh, torn.views, torn.choice);
+    // Far along the seam the levels hardly change.
+    EXPECT_NEAR(bent.added[0][0].x, clean.added[0][0].x, 5)
+        << "of the 110 by which the photos differ there";
+    EXPECT_GT(bent.after, 2);
 }
 
 }  // namespace

@@ -204,7 +204,8 @@ def _scene_render(self, viewmats, Ks, width, height, **options):
 def _scene_mesh(self, viewmats=None, Ks=None, width=None, height=None, *, cameras=None,
                 resolution=-1, method="tsdf", depth=None, level=0.5, voxel=None,
                 truncation=4, far=None, near=0.2, bounds=None, faces=None, keep=None,
-                min_island=50, fill_holes=None, texture="vertex", texel=None, collider=None,
+                min_island=50, fill_holes=None, texture="vertex", texel=None, seams="level",
+                collider=None,
                 capsule=(0.2, 1.6), up=None, reference=None, thresholds=None, align=None,
                 output=None, device=""):
     """`darb mesh` for this scene -> (vertices, faces, colours, info).
@@ -230,7 +231,7 @@ def _scene_mesh(self, viewmats=None, Ks=None, width=None, height=None, *, camera
          "resolution": resolution, "method": method, "depth": depth, "level": level, "voxel": voxel,
          "truncation": truncation, "far": far, "near": near, "bounds": bounds, "faces": faces,
          "keep": keep, "min_island": min_island, "fill_holes": fill_holes, "texture": texture,
-         "texel": texel, "collider": collider, "capsule": capsule, "up": up,
+         "texel": texel, "seams": seams, "collider": collider, "capsule": capsule, "up": up,
          "reference": reference, "thresholds": thresholds, "align": align, "output": output})
 
 

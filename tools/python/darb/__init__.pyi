@@ -95,7 +95,7 @@ class Scene:
              far: Optional[float] = None, near: float = 0.2, bounds: Optional[ArrayLike] = None,
              faces: Optional[int] = None, keep: Optional[int] = None, min_island: int = 50,
              fill_holes: Optional[float] = None, texture: str = "vertex",
-             texel: Optional[float] = None, collider: Optional[str] = None,
+             texel: Optional[float] = None, seams: str = "level", collider: Optional[str] = None,
              capsule: ArrayLike = (0.2, 1.6), up: Optional[str] = None,
              reference: Optional[Path] = None, thresholds: Optional[ArrayLike] = None,
              align: Optional[str] = None, output: Optional[Path] = None, device: DeviceLike = ""
