@@ -185,7 +185,7 @@ class GradientErrors {
         exact_.alpha_cutoff = static_cast<float>(preset_accuracy(kExact).value(kAlphaCutoff));
         exact_.transmittance_stop =
             static_cast<float>(preset_accuracy(kExact).value(kTransmittanceStop));
-        lambda_dssim_ = options.lambda_dssim;
+        lambda_dssim_ = options.dssim_weight();
         const std::vector<size_t> views = views_of(dataset, false);
         const size_t count = std::min(views.size(), kGradientPhotos);
         for (size_t k = 0; k < count; ++k) {

@@ -14,27 +14,29 @@ namespace {
 // Splats go up by the detail of the photos' opaque pixels times the root of the pixels that show
 // the scene once, which hardly changes with the size of the photos: a threshold in shares of the
 // picture asks for as many. They go down with the number of photos, up to the most that were
-// tried, and with the threshold. Where the detail is not known, it goes by the root of all pixels.
-// A dense start grows by so much at least; splats go up to so many for one of the start, and not
-// faster than so much a round.
+// tried, and with the threshold; they go up with the weight of SSIM. Where the detail is not known,
+// it goes by the root of all pixels. A dense start grows by so much at least; splats go up to so
+// many for one of the start, and not faster than so much a round.
 constexpr double kSplatsByDetail = 19'000, kDetailPower = 0.774, kPhotoPower = -0.39;
 constexpr std::size_t kMostPhotosTried = 60;
 constexpr double kUsualThreshold = 2e-4, kThresholdPower = -0.72;
+constexpr double kUsualDssim = 0.2, kDssimPower = 0.65;  // 1.3 times as many at 0.3
 constexpr double kSplatsPerRootPixel = 25;
 constexpr double kDenseGrowth = 1.3;
 constexpr double kMaxGrowth = 60;
 constexpr double kGrowthPerRound = 1.4;
 
-double splats_wanted(const GrowthStart& start, double threshold) {
+double splats_wanted(const GrowthStart& start, const TrainOptions& options) {
     const auto pixels = static_cast<double>(start.photo_pixels);
     const auto& [per_pixel, opaque] = start.detail;
     if (opaque == 0 || start.scene_pixels == 0) return kSplatsPerRootPixel * std::sqrt(pixels);
     const double detail = per_pixel * opaque * std::sqrt(start.scene_pixels * opaque);
     const auto photos =
         static_cast<double>(std::clamp<std::size_t>(start.photos, 1, kMostPhotosTried));
-    const double by_detail = kSplatsByDetail * std::pow(detail, kDetailPower) *
-                             std::pow(photos, kPhotoPower) *
-                             std::pow(threshold / kUsualThreshold, kThresholdPower);
+    const double by_detail =
+        kSplatsByDetail * std::pow(detail, kDetailPower) * std::pow(photos, kPhotoPower) *
+        std::pow(options.densify_grad_threshold / kUsualThreshold, kThresholdPower) *
+        std::pow(options.dssim_weight() / kUsualDssim, kDssimPower);
     return start.dense ? std::max(by_detail, kDenseGrowth * start.splats) : by_detail;
 }
 
@@ -57,8 +59,8 @@ std::uint32_t end_by_photos(const Schedule& schedule, const GrowthStart& start) 
     const int rounds = std::max(0, last - first);
     const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
     const double most = std::min(growth * start.splats, static_cast<double>(start.limit));
-    const double threshold = schedule.options.densify_grad_threshold;
-    const auto end = static_cast<std::uint32_t>(std::min(splats_wanted(start, threshold), most));
+    const auto end =
+        static_cast<std::uint32_t>(std::min(splats_wanted(start, schedule.options), most));
     return start.random && rounds > 0 ? end : std::max(start.splats, end);
 }
 

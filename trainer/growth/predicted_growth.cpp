@@ -61,10 +61,15 @@ std::uint64_t training_pixels(const Dataset& dataset) {
 
 }  // namespace
 
+double mean_photo_pixels(const Dataset& dataset) {
+    const std::size_t photos = training_photos(dataset);
+    return photos == 0 ? 0 : double(training_pixels(dataset)) / double(photos);
+}
+
 double scene_pixels(const Dataset& dataset) {
     const std::size_t photos = training_photos(dataset);
     if (photos == 0) return 0;
-    return double(training_pixels(dataset)) / double(photos) / share_with_a_point(dataset, photos);
+    return mean_photo_pixels(dataset) / share_with_a_point(dataset, photos);
 }
 
 std::uint32_t predict_splats(const Schedule& schedule, const GrowthStart& start) {

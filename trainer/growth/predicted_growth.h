@@ -15,6 +15,8 @@ namespace darb {
 /// whose frame has a point of the data set, the mean over its points. Without points every photo is
 /// taken to show all of the scene. Lenses are left aside.
 double scene_pixels(const Dataset& dataset);
+/// Pixels of a training photo, in the mean; 0 without any.
+double mean_photo_pixels(const Dataset& dataset);
 
 /// Splats at the end: by the strategy's rule of thumb.
 std::uint32_t predict_splats(const Schedule& schedule, const GrowthStart& start);

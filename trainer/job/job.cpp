@@ -52,6 +52,14 @@ std::string adjust_cameras(Dataset& dataset) {
                : fmt::format("cameras: they fit the tracks, {:.2f} px in the middle", a.before_px);
 }
 
+// Large photos have detail that the mean difference hardly weighs.
+void plan_loss(TrainJob& job) {
+    constexpr double kLargePhoto = 4e5;  // px
+    if (job.options.lambda_dssim) return;
+    const double pixels = mean_photo_pixels(job.dataset);
+    job.options.lambda_dssim = pixels >= kLargePhoto ? 0.3f : 0.2f;
+}
+
 void plan_effects(TrainJob& job, bool looks) {
     Dataset& dataset = job.dataset;
     const bool sees = !dataset.points.seen_begin.empty() || dataset.has_alpha;
@@ -138,6 +146,7 @@ TrainJob resolve(TrainRequest request, Dataset dataset, std::vector<ImageU8> pho
     job.request = std::move(request);
     job.dataset = std::move(dataset);
     job.photos = std::move(photos);
+    plan_loss(job);
     plan_effects(job, looks);
     plan_region(job);
     plan_strategy(job);

@@ -81,7 +81,10 @@ struct TrainOptions {
     bool white_background = false;  // what pictures are compared over; black otherwise
     bool random_background = true;  // train over another colour each iteration: no surface can
                                     // stay half transparent to borrow the background's colour
-    float lambda_dssim = 0.2f;
+    // Weight of 1 - SSIM in the loss. Absent: resolve() takes 0.3 for photos of 0.4
+    // megapixels or more, which gain by it (docs/experiments/real_scale.md); else it is 0.2.
+    std::optional<float> lambda_dssim;
+    float dssim_weight() const { return lambda_dssim.value_or(0.2f); }
 
     // Where splats grow in number; absent: everywhere. Those outside are trained and pruned, but
     // not cloned, split or drawn as places for others, so that they stay as coarse as they began.

@@ -84,7 +84,7 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& ph
       forward_(device, forward_options(options)),
       backward_(device, forward_options(options)),
       loss_(device, photos.largest_width(), photos.largest_height(), loss),
-      lambda_dssim_(options.lambda_dssim),
+      lambda_dssim_(options.dssim_weight()),
       depth_weight_(options.depth_weight),
       d_image_(device, "d_image",
                photos.largest_photo() * 4 * d_image_planes(forward_options(options))),

@@ -128,7 +128,7 @@ TEST_F(Request, names_the_entry_that_is_wrong) {
     for (const auto& [pointer, value] :
          std::map<std::string, Json>{{"/train/iterations", "x"},
                                      {"/train/iterations", 0.5},
-                                     {"/train/lambda-dssim", nullptr},
+                                     {"/train/densify-grad-threshold", nullptr},
                                      {"/train/random-background", 1},
                                      {"/data/resolution", "wide"},
                                      {"/data/dataset", 7},
