@@ -271,6 +271,17 @@ EffectRow shutter_rule(const std::vector<View>& views) {
     return row;
 }
 
+/// Where cameras are refined, motion that no file has can be found: a probe decides, unless the
+/// command line does.
+void try_shutter(const Dataset& dataset, const EffectChoice& choice, EffectPlan& plan) {
+    EffectRow& row = plan.row(EFFECT_SHUTTER);
+    const bool has_faces =
+        std::ranges::any_of(dataset.views, [](const View& view) { return view.face >= 0; });
+    row.tried = plan.on(EFFECT_CAMERAS) && !row.on && !has_faces &&
+                choice.base != EffectChoice::Base::none && !choice.changed[EFFECT_SHUTTER];
+    if (row.tried) row.reason += "; as cameras are refined, a probe on photos set aside decides";
+}
+
 /// Depth of a point over the focal length, where the view sees it: the world's size of a pixel.
 std::optional<double> footprint(const Camera& camera, const double* point) {
     const glm::dvec3 p =
@@ -525,6 +536,7 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
                              "splats move while they train, beside the cameras too"};
     override_rows(choice, plan, sh_degree,
                   {EFFECT_DEPTH, EFFECT_CAMERAS, EFFECT_SURFACE, EFFECT_SHUTTER});
+    try_shutter(dataset, choice, plan);
     if (plan.on(EFFECT_DEPTH) && plan.row(EFFECT_DEPTH).measured == 0)
         throw Error("--effects with depth", "no training photo has a measured depth",
                     "Put depths/NAME.png or .npy beside the photos, or leave +depth out.");

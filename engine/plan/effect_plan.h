@@ -36,6 +36,7 @@ struct EffectRow {
     int degree = 0;           // degree of EFFECT_VIEW_COLOUR
     double measured = 0;      // what the rule looked at; its unit stands in the reason
     std::string reason;       // a clause
+    bool tried = false;       // EFFECT_SHUTTER: off at first, a probe in training decides
 };
 
 struct EffectPlan {

@@ -152,6 +152,27 @@ TEST(ExposureTraining, finds_the_gains_of_the_photos) {
         EXPECT_NEAR(sums[k], kIdentityColours[k], 1e-5) << "the mean of the maps, " << k;
 }
 
+// Six views each of two panoramas.
+TEST(ExposureTraining, faces_of_a_panorama_share_one_map) {
+    ProbeCase t = training_of(0.0f);
+    t.options.probe_sh = false;
+    t.options.sh_degree = 0;
+    t.options.exposure = true;
+    for (size_t v = 0; v < t.photos.size(); ++v) {
+        t.dataset.views[v].face = static_cast<int>(v % 6);
+        t.dataset.views[v].photo = v < 6 ? "first.jpg" : "second.jpg";
+    }
+    Trainer trainer = t.trainer();
+    run_and_drain(trainer, 30);
+    const auto maps = trainer.exposures();
+    ASSERT_EQ(maps.size(), 12u);
+    for (size_t v = 0; v < maps.size(); ++v)
+        EXPECT_EQ(maps.at(t.dataset.views[v].name), maps.at(t.dataset.views[v / 6 * 6].name)) << v;
+    EXPECT_NE(maps.at(t.dataset.views[0].name), maps.at(t.dataset.views[6].name));
+    EXPECT_EQ(trainer.state().exposure.size(), 2u * 12 * 3) << "maps and moments of two photos";
+    expect_resumes(t, trainer, {17});
+}
+
 // The left of every photo is darker in one half of them, the right in the other.
 TEST(ExposureTraining, a_grid_finds_tones_that_one_map_does_not_long) {
     ProbeCase t = training_of(0.0f);

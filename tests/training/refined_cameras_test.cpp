@@ -93,6 +93,70 @@ TEST(RefinedCameras, one_that_is_held_out_fits_its_photo_while_the_scene_stays) 
     EXPECT_LT(shift_px(aligned, t.truth[0].camera, places), 0.1);
 }
 
+// Twelve photos, whose rows are exposed while the cameras turn, where `fast` is not 0. The splats
+// are those of the scene and stay.
+struct RollingTraining : TinyTraining {
+    SplatModel scene;
+
+    explicit RollingTraining(double fast) : TinyTraining(tiny_training({.views = 12})) {
+        const DisturbedTraining usual(0);
+        scene = usual.scene;
+        options = usual.options;
+        options.probe_shutter = true;
+        ForwardOptions pictures;
+        pictures.effects.shutter = pictures.effects.off_centre = true;
+        pictures.kernel = scene.kernel;
+        Renderer renderer(shared_device(), scene, pictures);
+        Pcg32 rng(7);
+        for (size_t v = 0; v < photos.size(); ++v) {
+            Camera camera = dataset.views[v].camera;
+            camera.shutter.active = true;
+            for (int k = 0; k < 3; ++k) camera.shutter.turn[k] = fast * rng.normal();
+            photos[v] = with_alpha(to_8bit(renderer.render(camera)));
+        }
+        for (View& view : dataset.views) view.is_test = false;
+    }
+};
+
+TEST(RefinedCameras, rows_that_roll_are_admitted_by_photos_set_aside) {
+    const RollingTraining t(0.08);
+    const int at = ShutterProbe::at(t.options);
+    Trainer trainer(shared_device(), t.dataset, t.photos, t.scene, t.options);
+    run_and_drain(trainer, at);
+    EXPECT_FALSE(trainer.effects().shutter);
+    const Trainer::State before = trainer.state();
+    run_and_drain(trainer, at + 12);
+    ASSERT_EQ(trainer.probes().size(), 1u);
+    EXPECT_TRUE(trainer.probes()[0].admitted) << trainer.probes()[0].gain_db;
+    EXPECT_EQ(trainer.probes()[0].iteration, at);
+    EXPECT_TRUE(trainer.effects().shutter);
+    EXPECT_GT(trainer.camera_moves()->median_rolled_px, 0.3);
+
+    // It goes on from before the probe and from after it.
+    for (const Trainer::State& from : {before, trainer.state()}) {
+        Trainer again(shared_device(), t.dataset, t.photos, t.scene, t.options);
+        again.restore(from);
+        EXPECT_EQ(again.effects().shutter, from.iteration > at);
+        run_and_drain(again, at + 24);
+        if (trainer.iteration() < at + 24) run_and_drain(trainer, at + 24);
+        EXPECT_TRUE(same_state(trainer, again)) << "from " << from.iteration;
+    }
+}
+
+TEST(RefinedCameras, rows_that_do_not_roll_are_refused_without_a_trace) {
+    RollingTraining t(0);
+    const int at = ShutterProbe::at(t.options);
+    Trainer probed(shared_device(), t.dataset, t.photos, t.scene, t.options);
+    run_and_drain(probed, at + 12);
+    ASSERT_EQ(probed.probes().size(), 1u);
+    EXPECT_FALSE(probed.probes()[0].admitted) << probed.probes()[0].gain_db;
+    EXPECT_FALSE(probed.effects().shutter);
+    t.options.probe_shutter = false;
+    Trainer plain(shared_device(), t.dataset, t.photos, t.scene, t.options);
+    run_and_drain(plain, at + 12);
+    EXPECT_TRUE(same_state(probed, plain));
+}
+
 // Through density control, probes and smaller photos.
 void check_resume(int batch, int stop, int end) {
     TinyTraining t = tiny_training();

@@ -268,6 +268,7 @@ void apply_plan(const EffectPlan& plan, TrainOptions& options) {
     options.refine_cameras = plan.on(EFFECT_CAMERAS);
     options.surface = plan.on(EFFECT_SURFACE);
     options.projection = plan.projection();
+    options.probe_shutter = plan.row(EFFECT_SHUTTER).tried;
     options.alpha = plan.on(EFFECT_ALPHA);
     options.huge_splat_path = plan.huge_splat_path();
 }

@@ -23,6 +23,9 @@ bool has_noise(const Opt& o, const Sched&) {
 bool refines_cameras(const Opt& o, const Sched&) {
     return o.refine_cameras;
 }
+bool tries_shutters(const Opt& o, const Sched&) {
+    return o.probe_shutter;
+}
 bool compares_depths(const Opt& o, const Sched&) {
     return o.depth;
 }
@@ -122,6 +125,10 @@ const OptionRow kRows[] = {
 
     // What plans of --effects decide; settings_json adds TrainOptions::projection.
     {.setting = "/effects/probe_sh", .member = &Opt::probe_sh, .group = option_group::kEffects},
+    {.setting = "/effects/probe_shutter",
+     .member = &Opt::probe_shutter,
+     .group = option_group::kEffects,
+     .stands = tries_shutters},
     {.setting = "/effects/antialias", .member = &Opt::antialias, .group = option_group::kEffects},
     {.setting = "/effects/exposure", .member = &Opt::exposure, .group = option_group::kEffects},
     {.setting = "/effects/depth",

@@ -55,6 +55,9 @@ struct TrainOptions {
     // probes of a few iterations refuse them wrongly, and without these degrees the shipped scene
     // has 31.62 dB after 4,000, with them 32.20.
     bool probe_sh = false;
+    // With refined cameras: shutters that roll are trained where a probe on training photos set
+    // aside gains. ProjectionEffects::shutter trains them from the start.
+    bool probe_shutter = false;
     bool antialias = false;  // opacity compensation and the 3D smoothing filter of Mip-Splatting
     bool exposure = false;   // an affine map of colours per photo, trained beside the splats
     bool exposure_grid = false;  // with exposure: a bilateral grid of maps per photo in its place

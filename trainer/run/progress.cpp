@@ -98,10 +98,10 @@ TimeLeft::TimeLeft(const Schedule& schedule, const PaceForecast& pace)
     : iterations_(schedule.options.iterations), pace_(pace) {
     const TrainOptions& options = schedule.options;
     has_target_ = strategy_row(options.strategy).grows_to_limit;
-    if (options.probe_sh && schedule.degree_interval < iterations_) {
-        probe_at_ = schedule.degree_interval;
-        probe_iterations_ = probe_iterations(schedule);
-    }
+    if (options.probe_sh && schedule.degree_interval < iterations_)
+        probes_[schedule.degree_interval] += DegreeProbe::iterations(schedule);
+    if (const int at = ShutterProbe::at(schedule); at > 0 && at < iterations_)
+        probes_[at] += ShutterProbe::iterations(schedule);
     const double all = iterations_;
     steady_.half_life = std::max(kSteadyIterations, kSteadyShare * all);
     quick_.half_life = std::max(kQuickIterations, kQuickShare * all);
@@ -206,7 +206,8 @@ double TimeLeft::seconds() const {
     double ms = 0;
     for (int i = iteration_ + 1; i <= iterations_; ++i) {
         const double one = model_ms(i, later_splats(i));
-        ms += i == probe_at_ ? (1 + probe_iterations_) * one : one;
+        const auto probe = probes_.find(i);
+        ms += probe == probes_.end() ? one : (1 + probe->second) * one;
     }
     return 1e-3 * ms * pace();
 }

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -54,9 +55,10 @@ class TimeLeft {
     double model_ms(int iteration, double splats) const;
     double later_splats(int iteration) const;
 
-    int iterations_, probe_at_ = 0, probe_iterations_ = 0;  // 0: there is no probe
-    bool has_target_ = false;                               // the strategy's end is known
-    double limit_ = 0;                                      // most splats
+    int iterations_;
+    std::map<int, int> probes_;  // iteration: those of the probe that precedes the next
+    bool has_target_ = false;    // the strategy's end is known
+    double limit_ = 0;           // most splats
     PaceForecast pace_;
     std::vector<double> counts_;  // [iteration] splats, as forecast
     std::vector<double> ramp_;    // [iteration] share of the time on whole photos

@@ -126,6 +126,12 @@ class Run {
     void report_troubles();
     void report_resolution();
     void report_memory();
+    /// With the effects that a probe admitted.
+    TrainOptions options_now() const {
+        TrainOptions options = schedule_.options;
+        options.projection.shutter = trainer_.effects().shutter;
+        return options;
+    }
     void report_probes();
     void look_at_forms();
     void report_cameras();
@@ -275,10 +281,10 @@ void Run::clean(int iteration, SplatModel& model) {
     std::vector<Camera> cameras;
     for (std::size_t v = 0; v < dataset_.views.size(); ++v)
         if (!dataset_.views[v].is_test) cameras.push_back(trainer_.camera(v));
-    const TrainOptions& o = schedule_.options;
     try {
         const Clutter clutter =
             find_clutter(device_, model, evenly_chosen(cameras), run_.cleaning, [&] {
+                const TrainOptions& o = options_now();
                 return std::make_unique<Renderer>(device_, model, Accuracy{}, o.projection,
                                                   o.huge_splat_path);
             });
@@ -302,7 +308,7 @@ void Run::leave_out(int iteration, const Clutter& clutter, SplatModel& model) {
     if (count_of(goes) == goes.size())
         return progress_.warn("the scene is not cleaned: nothing would be left of it");
     keep_splats([&](std::size_t i) { return goes[i] == 0; }, model);
-    ForwardOptions pictures = forward_options(schedule_.options);
+    ForwardOptions pictures = forward_options(options_now());
     pictures.store_for_backward = pictures.depth_sum = pictures.depth_spread = false;
     Renderer renderer(device_, model, pictures);
     const Evaluation after =
@@ -580,7 +586,7 @@ void Run::look_at_forms() {
         const TuningRecord seen =
             look_again(device_, *record,
                        {trainer_.splats(), camera_data(view->camera, trainer_.splats().origin()),
-                        trainer_.sh_degree(), forward_options(schedule_.options)});
+                        trainer_.sh_degree(), forward_options(options_now())});
         write_tuning(device_.info(), device_.cache_folder(), seen);
         if (seen.choice != record->choice)
             progress_.note(
@@ -646,13 +652,16 @@ void Run::report_probes() {
     for (; told_probes_ < trainer_.probes().size(); ++told_probes_) {
         const Trainer::Probe& p = trainer_.probes()[told_probes_];
         log_.probe(trainer_.iteration(), p);
+        const bool shutter = p.effect == EFFECT_SHUTTER;
         const std::string reason = !std::isnan(p.gain_db)
                                        ? fmt::format("{:+.3f} dB on photos set aside", p.gain_db)
                                    : p.admitted && p.degree > 1 ? "follows the first"
-                                   : p.admitted                 ? "too few photos to set some aside"
+                                   : p.admitted || shutter      ? "too few photos to set some aside"
                                                                 : "--max-memory has no room for it";
-        progress_.note(fmt::format("iteration {}: colour of degree {} {} ({})", p.iteration,
-                                   p.degree, p.admitted ? "admitted" : "refused", reason));
+        const std::string what =
+            shutter ? "rolling shutters" : fmt::format("colour of degree {}", p.degree);
+        progress_.note(fmt::format("iteration {}: {} {} ({})", p.iteration, what,
+                                   p.admitted ? "admitted" : "refused", reason));
     }
 }
 

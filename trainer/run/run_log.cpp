@@ -15,6 +15,7 @@
 #include "engine/data/run_events.h"
 #include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/plan/effect_plan.h"
 #include "engine/plan/tuner.h"
 #include "trainer/options/schedule.h"
 #include "trainer/options/strategy.h"
@@ -181,6 +182,7 @@ void RunLog::probe(int iteration, const Trainer::Probe& probe) {
     write({{"event", "probe"},
            {"iteration", iteration},
            {"after", probe.iteration},
+           {"effect", effect_name(probe.effect)},
            {"degree", probe.degree},
            {"gain_db", probe.gain_db},
            {"admitted", probe.admitted}});
@@ -358,15 +360,32 @@ std::vector<ReportPass> RunLog::passes(const Trainer& trainer) const {
 
 namespace {
 
+// Events of earlier versions name no effect.
+bool is_probe_of(int effect, const Json& e) {
+    return e.value("event", "") == "probe" &&
+           e.value("effect", std::string(effect_name(EFFECT_VIEW_COLOUR))) == effect_name(effect);
+}
+
 Json probes_of(const std::vector<Json>& events) {
     Json probes = Json::array();
     for (const Json& e : events)
-        if (e.value("event", "") == "probe")
+        if (is_probe_of(EFFECT_VIEW_COLOUR, e))
             probes.push_back({{"iteration", e.value("after", 0)},
                               {"degree", e.value("degree", 0)},
                               {"gain_db", number(e, "gain_db")},
                               {"admitted", e.value("admitted", false)}});
     return probes;
+}
+
+/// The last probe of shutters that roll; null: there was none.
+Json shutter_probe_of(const std::vector<Json>& events) {
+    Json found;
+    for (const Json& e : events)
+        if (is_probe_of(EFFECT_SHUTTER, e))
+            found = {{"iteration", e.value("after", 0)},
+                     {"gain_db", number(e, "gain_db")},
+                     {"admitted", e.value("admitted", false)}};
+    return found;
 }
 
 Json changes_of(const std::vector<Json>& events) {
@@ -431,6 +450,8 @@ std::filesystem::path RunLog::finish(const TrainResult& summary, const Trainer& 
         if (const KernelDefinition* own = kernel_definition(trainer.kernel()))
             metrics["kernel_definition"] = definition_json(*own);
     if (const Json changes = changes_of(events_); !changes.empty()) metrics["changes"] = changes;
+    if (const Json probe = shutter_probe_of(events_); !probe.is_null())
+        metrics["shutter_probe"] = probe;
     if (!summary.ended_early.empty()) metrics["ended_early"] = summary.ended_early;
     if (const std::optional<CameraMoves> m = trainer.camera_moves()) {
         metrics["cameras"] = {{"refined", m->cameras},

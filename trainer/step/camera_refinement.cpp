@@ -90,6 +90,7 @@ CameraRefinement::CameraRefinement(const Dataset& dataset, const TrainOptions& o
       from_(options.camera_from),
       iterations_(options.iterations),
       shutters_(options.projection.shutter),
+      tries_shutters_(options.probe_shutter),
       points_(positions(dataset.points)),
       pose_of_(dataset.views.size(), -1),
       gauge_({}, {}) {
@@ -204,9 +205,9 @@ PoseVector CameraRefinement::pose_gradient(const Pose& pose, const CameraGradien
         {by_turn.x, by_turn.y, by_turn.z, d.d_translation.x, d.d_translation.y, d.d_translation.z});
 }
 
-bool CameraRefinement::step(int iteration, std::span<const CameraVisit> visits) {
+bool CameraRefinement::step(int iteration, std::span<const CameraVisit> visits, double share) {
     if (iteration <= from_ * iterations_) return false;
-    const double now = rate(iteration);
+    const double now = share * rate(iteration);
     std::map<int, std::array<double, 4>> by_group;
     for (const CameraVisit& visit : visits) {
         Pose& pose =
@@ -257,6 +258,7 @@ void CameraRefinement::place_cameras() {
     for (std::size_t v = 0; v < cameras_.size(); ++v) {
         const int pose = pose_of_[v];
         cameras_[v] = start_[v];
+        cameras_[v].shutter.active |= shutters_;  // of held-out ones, too: they may be aligned
         if (pose >= 0) {
             const Pose& own = poses_[static_cast<std::size_t>(pose)];
             cameras_[v] = moved_camera(start_[v], step_of(own));
@@ -318,11 +320,26 @@ std::vector<float> CameraRefinement::state() const {
     return values;
 }
 
+std::vector<float> CameraRefinement::with_shutters(const std::vector<float>& state) const {
+    std::vector<float> with;
+    for (std::size_t p = 0; p < poses_.size(); ++p) {
+        const auto pose = state.begin() + static_cast<std::ptrdiff_t>(p * kPoseFloats);
+        with.insert(with.end(), pose, pose + kPoseFloats);
+        with.insert(with.end(), kPoseFloats, 0.0f);
+    }
+    with.insert(with.end(),
+                state.begin() + static_cast<std::ptrdiff_t>(poses_.size() * kPoseFloats),
+                state.end());
+    return with;
+}
+
 void CameraRefinement::restore(const std::vector<float>& state) {
-    if (state.size() != state_size())
+    const bool shutters = tries_shutters_ ? state.size() == state_size(true) : shutters_;
+    if (state.size() != state_size(shutters))
         throw Error("refined cameras",
-                    fmt::format("{} values instead of {}", state.size(), state_size()),
+                    fmt::format("{} values instead of {}", state.size(), state_size(shutters)),
                     "Restore what state() gave for these photos.");
+    shutters_ = shutters;
     auto at = state.begin();
     const auto take = [&](auto& trained) {
         for (auto* part : {&trained.value, &trained.first, &trained.second}) {

@@ -53,17 +53,21 @@ class CameraRefinement {
 
     /// After an iteration's step of the splats; nothing happens before the run's share
     /// camera_from. True where cameras changed.
-    bool step(int iteration, std::span<const CameraVisit> visits);
+    /// share: of its rates.
+    bool step(int iteration, std::span<const CameraVisit> visits, double share = 1);
+
+    /// Whether shutters are trained: from the start, or since a state with them was restored.
+    bool shutters() const { return shutters_; }
+    /// A state() without shutters, with ones that are trained from then on and begin still.
+    std::vector<float> with_shutters(const std::vector<float>& state) const;
 
     CameraMoves moves() const;
 
     /// For checkpoints: values, moments and visits of poses, of their shutters where those are
-    /// trained, then of intrinsics.
+    /// trained, then of intrinsics. Where a run tries shutters, a state tells by its size whether
+    /// it has them.
     std::vector<float> state() const;
     void restore(const std::vector<float>& state);
-    std::size_t state_size() const {
-        return poses_.size() * (shutters_ ? 38 : 19) + groups_.size() * 13;
-    }
 
   private:
     template <std::size_t N>
@@ -79,11 +83,15 @@ class CameraRefinement {
         Trained<6> shutter;  // change of turn and -move, over the read-out as kRowSpread says
         std::vector<TrackObservation> tracks;
     };
-    struct Group {  // views with the same intrinsics
+    static constexpr std::size_t kPoseFloats = 19;  // of a Trained<6>, in a state
+    struct Group {                                  // views with the same intrinsics
         double trained_views = 0;
         glm::dvec4 unit{1.0};  // change of fx, fy, cx, cy that shifts a picture by 1 px
         Trained<4> trained;
     };
+    std::size_t state_size(bool shutters) const {
+        return poses_.size() * kPoseFloats * (shutters ? 2 : 1) + groups_.size() * 13;
+    }
     double rate(int iteration) const;
     void add_anchor(const Pose& pose, CameraGradient& gradient) const;
     PoseVector pose_gradient(const Pose& pose, const CameraGradient& gradient) const;
@@ -93,7 +101,7 @@ class CameraRefinement {
 
     double rate_px_, anchor_, from_;
     int iterations_;
-    bool shutters_;                        // whether shutters are trained
+    bool shutters_, tries_shutters_;       // whether shutters are trained; whether that may change
     std::vector<Camera> start_, cameras_;  // [view]
     std::vector<glm::dvec3> points_;       // points of the data set, which stay fixed
     std::vector<Pose> poses_;              // one per training photo, in order

@@ -350,7 +350,8 @@ std::string gain_contradiction(const GainState& gain, int iteration, Schedule sc
 }
 
 // What the settings say and the state does not follow, which no run writes.
-std::string contradiction(const Checkpoint& checkpoint, const Schedule& schedule, size_t photos) {
+std::string contradiction(const Checkpoint& checkpoint, const Schedule& schedule,
+                          std::uint32_t exposures) {
     const TrainOptions& o = schedule.options;
     const TrainerState& s = checkpoint.state;
     const SplatModel& m = s.model;
@@ -369,8 +370,7 @@ std::string contradiction(const Checkpoint& checkpoint, const Schedule& schedule
                            o.sh_degree);
     if (m.antialias != o.antialias || (!s.smoothing.empty() && !o.antialias) ||
         (!s.exposure.empty() &&
-         (!o.exposure || s.exposure.size() !=
-                             exposure_maps(o, static_cast<std::uint32_t>(photos)).state_size())) ||
+         (!o.exposure || s.exposure.size() != exposure_maps(o, exposures).state_size())) ||
         (!s.cameras.empty() && !o.refine_cameras) ||
         s.profile.size() != (learns ? kProfileFloats : 0) ||
         (!s.rest_sum.empty() && schedule.rest_every <= 1))
@@ -433,9 +433,8 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
             "the data set " + dataset.root.string() + " is not the one it was trained on",
             "Restore the photos, cameras and held-out views (--eval, --hold-out) of that run, "
             "or start without --resume.");
-    const auto photos = static_cast<size_t>(
-        std::ranges::count_if(dataset.views, [](const View& v) { return !v.is_test; }));
-    if (const std::string what = contradiction(checkpoint, schedule, photos); !what.empty())
+    const std::uint32_t exposures = exposure_count(dataset.views);
+    if (const std::string what = contradiction(checkpoint, schedule, exposures); !what.empty())
         throw Error(path.string(), what, kOtherCheckpoint);
 }
 

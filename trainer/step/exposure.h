@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Per-photo exposure in training: an affine map of colours a photo, or a bilateral grid of them,
-// between picture and loss, trained by Adam beside the splats. Off in pictures for evaluation. The
-// mean of all maps stays the identity. It maps what the splats show and leaves the background as it
-// is.
+// between picture and loss, trained by Adam beside the splats. The faces of a panorama are one
+// photo and share one (exposure_numbers). Off in pictures for evaluation. The mean of all maps
+// stays the identity. It maps what the splats show and leaves the background as it is.
 #pragma once
 
 #include <array>
@@ -34,9 +34,9 @@ ImageF apply_exposure(const ColourMap& map, const ImageF& image, const ImageU8& 
 
 /// One step of Adam on a photo's map.
 struct ExposureStep {
-    std::uint32_t photo = 0, pixels = 0;
-    float rate = 0;  // Adam's learning rate
-    int visits = 1;  // visits to this photo, this one included
+    std::uint32_t photo = 0, pixels = 0;  // photo: the number of its map
+    float rate = 0;                       // Adam's learning rate
+    int visits = 1;                       // steps of this map, this one included
 };
 
 /// What a map applies to.

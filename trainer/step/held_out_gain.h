@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
-// GainWatch: whether held-out photos still gain by more iterations, for runs that are to end when
-// they do not.
+// What photos that are not trained on say about a run. GainWatch: whether held-out photos still
+// gain by more iterations, for runs that are to end when they do not. Probes: whether an effect
+// pays.
 #pragma once
 
 #include <functional>
+#include <glm/vec3.hpp>
 #include <string>
 #include <vector>
 
+#include "engine/core/image.h"
 #include "engine/data/dataset.h"
+#include "shaders/shared/effect_list.h"
 #include "trainer/options/schedule.h"
 #include "trainer/step/rank_group.h"
 #include "trainer/step/trainer_state.h"
@@ -62,16 +66,18 @@ class GainWatch {
     GainLook best_;
 };
 
-// DegreeProbe: whether colour that changes with the view pays, found out by trying. A probe forks
-// the state of a run: some iterations without and with another degree of harmonics, each from the
-// same state, compared on training photos that both leave out. Then the run goes on from where it
-// was, with the degree that won.
+// Probes: whether an effect pays, found out by trying. A probe forks the state of a run: some
+// iterations without and with the effect, each from the same state, compared on training photos
+// that both leave out. Then the run goes on from where it was, with the effect if it won.
 
 /// What a probe found.
 struct ProbeResult {
-    int iteration = 0, degree = 0;  // degree: the one on trial
+    int iteration = 0;
+    int effect = EFFECT_VIEW_COLOUR;  // EFFECT_VIEW_COLOUR or EFFECT_SHUTTER
+    int degree = 0;                   // of EFFECT_VIEW_COLOUR: the one on trial
     // Gain on the photos set aside. NaN where nothing was measured: with too few photos or a degree
-    // above the first it is admitted, without room for it within max_memory_bytes it is refused.
+    // above the first a degree is admitted and a shutter is not; without room for it within
+    // max_memory_bytes a degree is refused.
     double gain_db = 0;
     bool admitted = false;
 };
@@ -82,29 +88,67 @@ struct ProbeFork {
     std::function<void(const TrainerState& state)> restore;
     /// Trains iteration `iteration` on a view, all rates times `share`, nothing else.
     std::function<void(int iteration, int view, float share)> step;
+    /// Fits what belongs to a photo set aside alone, and nothing else, between two steps; empty:
+    /// there is nothing of the kind.
+    std::function<void(int iteration, int view, float share)> fit;
     /// PSNR of the picture of a training view as it is now, dB.
     std::function<double(int view)> photo_psnr;
 };
 
-/// Iterations that one probe takes beside those of the run.
-int probe_iterations(const Schedule& schedule);
+/// Two arms of the same iterations from the same iteration of a run.
+class ProbeTrial {
+  public:
+    /// views: the training views, of which some are set aside. iterations: of an arm.
+    ProbeTrial(const std::vector<int>& views, int iterations);
+
+    /// Whether there are enough photos to set some aside.
+    bool is_possible() const { return !aside_.empty(); }
+    /// Mean PSNR on the photos set aside after the arm that begins with `with`, minus that after
+    /// the arm that begins with `without`. The fork ends away from the run's state.
+    double gain_db(const TrainerState& without, const TrainerState& with,
+                   const ProbeFork& fork) const;
+
+  private:
+    double train_arm(const TrainerState& start, const ProbeFork& fork) const;
+
+    int iterations_;
+    std::vector<int> trained_, aside_;  // views
+};
+
+/// What a camera is fitted to and what judges it: the rows of a picture in eight bands, every other
+/// one of either.
+enum class RowBands { fitted, judged };
+
+/// The error of a picture in such bands.
+struct BandError {
+    double squared = 0;  // mean of the squared error
+    ImageF d_image;      // [H][W][3], gradient of the mean absolute error
+};
+
+/// image: RGB, not clamped. photo: RGBA of the same size, compared as over this background. Pixels
+/// of alpha below 128 do not count where alpha is a mask.
+BandError band_error(const ImageF& image, const ImageU8& photo, const glm::vec3& background,
+                     bool alpha_is_mask, RowBands bands);
+
+// DegreeProbe: whether colour that changes with the view pays.
 
 class DegreeProbe {
   public:
     explicit DegreeProbe(const Schedule& schedule);
 
+    /// Iterations that one probe takes beside those of the run.
+    static int iterations(const Schedule& schedule);
     /// Whether a probe is due after the step that ends with this iteration, for splats of this
     /// degree.
     bool is_due(int iteration, int degree) const;
     /// Tries one more degree. state: the run's, which the fork ends away from; it gets the degree
     /// that won and the iteration of the next probe, for the caller to restore. views: the training
     /// views. has_room: for one more degree.
-    void run(TrainerState& state, const std::vector<int>& views, bool has_room,
-             const ProbeFork& fork);
+    ProbeResult run(TrainerState& state, const std::vector<int>& views, bool has_room,
+                    const ProbeFork& fork) const;
 
     /// Another schedule of the same run from now on; next() stays.
     void set_schedule(const Schedule& schedule) { schedule_ = schedule; }
-    const std::vector<ProbeResult>& results() const { return results_; }
     int next() const { return next_; }
     /// 0 leaves it as it is.
     void set_next(int iteration) {
@@ -112,15 +156,36 @@ class DegreeProbe {
     }
 
   private:
-    double train_arm(const TrainerState& start, int degree, const ProbeFork& fork) const;
-    void set_aside(const std::vector<int>& views);
-
     bool on_;
     int highest_degree_;
     Schedule schedule_;
     int next_;
-    std::vector<int> trained_, aside_;  // views
-    std::vector<ProbeResult> results_;
+};
+
+// ShutterProbe: whether the rows of photos were exposed one after the other, where cameras are
+// refined and no file says it. There is one such probe in a run.
+
+class ShutterProbe {
+  public:
+    explicit ShutterProbe(const Schedule& schedule) : schedule_(schedule) {}
+
+    /// The iteration after which a run tries; 0: it never does.
+    static int at(const Schedule& schedule);
+    /// Iterations that the probe takes beside those of the run.
+    static int iterations(const Schedule& schedule);
+    /// Whether it is due after the step that ends with this iteration.
+    bool is_due(int iteration) const;
+    /// state: the run's, which the fork ends away from; it becomes `rolling`, the same with
+    /// shutters that are trained, where that won, for the caller to restore. views: the training
+    /// views.
+    ProbeResult run(TrainerState& state, const TrainerState& rolling, const std::vector<int>& views,
+                    const ProbeFork& fork) const;
+
+    /// Another schedule of the same run from now on.
+    void set_schedule(const Schedule& schedule) { schedule_ = schedule; }
+
+  private:
+    Schedule schedule_;
 };
 
 }  // namespace darb

@@ -171,7 +171,7 @@ void add_photos(const std::vector<View>& views, const Schedule& schedule, Memory
         if (compares_depth(options, view)) demand.depth_pixels += pixels;
         ++training;
     }
-    demand.exposure_photos = options.exposure ? training : 0;
+    demand.exposure_photos = options.exposure ? exposure_count(views) : 0;
     demand.exposure_grid = options.exposure_grid;
     demand.smoothing_photos = options.antialias ? training : 0;
     // With HugeSplatPath::always every frame is cut and shared from the first on.

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <map>
 #include <span>
 #include <utility>
 
@@ -26,6 +28,23 @@ Camera divided(const Camera& camera, double divisor) {
     smaller.fy *= y;
     smaller.cy *= y;
     return smaller;
+}
+
+std::vector<std::uint32_t> exposure_numbers(const std::vector<View>& views) {
+    std::vector<std::uint32_t> numbers;
+    std::map<std::filesystem::path, std::uint32_t> panoramas;
+    std::uint32_t count = 0;
+    for (const View& view : views) {
+        if (view.is_test) continue;
+        const bool known = view.face >= 0 && !panoramas.try_emplace(view.photo, count).second;
+        numbers.push_back(known ? panoramas.at(view.photo) : count++);
+    }
+    return numbers;
+}
+
+std::uint32_t exposure_count(const std::vector<View>& views) {
+    const std::vector<std::uint32_t> numbers = exposure_numbers(views);
+    return numbers.empty() ? 0 : *std::ranges::max_element(numbers) + 1;
 }
 
 ResolutionRamp::ResolutionRamp(Device& device)
@@ -71,6 +90,8 @@ TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
     : device_(&device),
       origin_(origin),
       nearest_(nearest_points(dataset)),
+      exposure_of_(exposure_numbers(dataset.views)),
+      exposures_(exposure_count(dataset.views)),
       memory_(stream ? Memory::waiting : Memory::device) {
     if (photos.size() != dataset.views.size())
         throw Error("training photos",
@@ -129,7 +150,8 @@ TrainingView TrainingPhotos::view(int view, int sh_degree, const glm::vec3& back
         {size.data[view], &size.cameras, static_cast<std::uint32_t>(view), sh_degree, background},
         static_cast<std::uint32_t>(photo),
         &size.photos[view],
-        measured_[static_cast<size_t>(view)]};
+        measured_[static_cast<size_t>(view)],
+        exposure_of_[static_cast<size_t>(photo)]};
 }
 
 void TrainingPhotos::fill(Commands& commands, Place& place, int view) {

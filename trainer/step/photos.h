@@ -23,6 +23,12 @@ namespace darb {
 /// The camera of a photo whose sides are divided and rounded: it sees the same.
 Camera divided(const Camera& camera, double divisor);
 
+/// For each training view, in order, which of the exposures is its own: one a photo, as the six
+/// faces of a panorama are one photo; numbered as they come.
+std::vector<std::uint32_t> exposure_numbers(const std::vector<View>& views);
+/// How many exposures there are.
+std::uint32_t exposure_count(const std::vector<View>& views);
+
 class ResolutionRamp {
   public:
     explicit ResolutionRamp(Device& device);
@@ -48,6 +54,7 @@ struct TrainingView {
     // the host where they wait.
     const Buffer* pixels = nullptr;
     bool measured = false;
+    std::uint32_t exposure = 0;  // of exposure_numbers()
 
     int width() const { return static_cast<int>(frame.camera.width); }
     int height() const { return static_cast<int>(frame.camera.height); }
@@ -64,6 +71,10 @@ class TrainingPhotos {
 
     /// The training views among all, ascending.
     const std::vector<int>& views() const { return views_; }
+    /// The exposures of the training photos.
+    std::uint32_t exposures() const { return exposures_; }
+    /// That of the training photo with this place among them.
+    std::uint32_t exposure(std::size_t photo) const { return exposure_of_[photo]; }
     std::size_t view_count() const { return view_cameras_.size(); }
     std::uint32_t count() const { return static_cast<std::uint32_t>(views_.size()); }
     TrainingView view(int view, int sh_degree, const glm::vec3& background) const;
@@ -130,6 +141,8 @@ class TrainingPhotos {
     std::vector<std::string> names_;    // [view]
     std::vector<double> nearest_;       // [view]
     std::vector<int> views_;
+    std::vector<std::uint32_t> exposure_of_;  // [training photo]
+    std::uint32_t exposures_;
     std::vector<bool> measured_;  // [view]
     double usual_depth_ = 1;
     int longest_side_ = 1, width_ = 1, height_ = 1;

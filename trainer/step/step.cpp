@@ -53,7 +53,7 @@ ForwardOptions forward_options(const TrainOptions& options) {
 namespace {
 
 ExposureStep exposure_step(const StepInput& input) {
-    return {input.view.photo, input.view.size(), input.exposure_rate, input.exposure_visits};
+    return {input.view.exposure, input.view.size(), input.exposure_rate, input.exposure_visits};
 }
 
 }  // namespace
@@ -90,7 +90,8 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& ph
                photos.largest_photo() * 4 * d_image_planes(forward_options(options))),
       flights_{Flight(device), Flight(device)} {
     if (options.exposure)
-        exposure_.emplace(device, exposure_maps(options, photos.count()), photos.largest_photo());
+        exposure_.emplace(device, exposure_maps(options, photos.exposures()),
+                          photos.largest_photo());
     const ForwardOptions forward = forward_options(options);
     if (forward.depth_sum)
         depth_.emplace(device, DepthLossOptions{loss.use_alpha, options.exposure, options.depth,
@@ -105,6 +106,15 @@ void TrainingStep::set_kernel(int kernel) {
     forward_.set_kernel(kernel);
     backward_.set_kernel(kernel);
     if (profile_) profile_->set_kernel(kernel);
+}
+
+void TrainingStep::set_shutter(bool rolls) {
+    drain();
+    ForwardOptions options = forward_.options();
+    if (options.effects.shutter == rolls) return;
+    options.effects.shutter = rolls;
+    forward_ = Forward(*device_, options);
+    backward_ = Backward(*device_, options);
 }
 
 void TrainingStep::reserve(int width, int height) {
@@ -178,7 +188,7 @@ void TrainingStep::record_picture(Commands& commands, const StepInput& input) {
     const TrainingView& view = input.view;
     Frame& frame = buffers_.frame();
     forward_.record(commands, *splats_, view.frame, frame);
-    if (exposure_) exposure_->record(commands, exposed(view), view.photo, view.size());
+    if (exposure_) exposure_->record(commands, exposed(view), view.exposure, view.size());
 }
 
 void TrainingStep::record_loss(Commands& commands, const StepInput& input, const Buffer& loss) {
@@ -361,7 +371,8 @@ double TrainingStep::photo_mse(const TrainingView& view) {
         flight.commands.begin();
         const Buffer& photo = photos_->place(flight.commands, view);
         forward_.record(flight.commands, *splats_, view.frame, frame);
-        if (exposure_) exposure_->record(flight.commands, exposed(view), view.photo, view.size());
+        if (exposure_)
+            exposure_->record(flight.commands, exposed(view), view.exposure, view.size());
         loss_.record(flight.commands,
                      {exposure_ ? exposure_->mapped() : image, photo, d_image_, flight.loss},
                      view.width(), view.height(), view.frame.background, lambda_dssim_);

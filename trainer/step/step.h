@@ -92,7 +92,7 @@ struct StepInput {
     AdamStep adam;
     float exposure_rate = 0;
     float distortion_weight = 0;          // of DepthLossWeights
-    int exposure_visits = 1;              // visits of this photo, including this step
+    int exposure_visits = 1;              // visits of its exposure, including this step
     DensityStrategy* strategy = nullptr;  // that records into the step
     bool samples_profile = false;         // its sums for the gradient of a learned kernel are taken
     // In a batch: where the view's gradients go instead of a step, and which view of it this is.
@@ -161,12 +161,17 @@ class TrainingStep {
 
     /// The steps that follow are of another kernel.
     void set_kernel(int kernel);
+    /// The steps that follow are with or without ProjectionEffects::shutter. Where that changes,
+    /// the gradient sum is to be restored.
+    void set_shutter(bool rolls);
     /// Of the frames that took part since they were cleared; only with options.learn_kernel.
     ProfileSums& profile() { return profile_.value(); }
 
     std::optional<Exposure>& exposure() { return exposure_; }
     /// What the buffers of a frame are made for now.
     const FrameSize& frame_size() const { return buffers_.size(); }
+    /// What pictures are projected with now.
+    const ProjectionEffects& effects() const { return forward_.options().effects; }
 
   private:
     struct Flight {

@@ -73,6 +73,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       ranks_(ranks.all ? ranks : RankGroup{&alone_}),
       schedule_(schedule),
       extent_(scene_extent(dataset)),
+      alpha_is_mask_(dataset.alpha_is_mask),
       memory_(device, dataset, schedule, static_cast<std::uint32_t>(start.size())),
       splats_(device, start_model(start, schedule.options), true, schedule_.rest_every > 1),
       photos_(device, dataset, photos, splats_.origin(), memory_.streams_photos(),
@@ -82,7 +83,8 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       density_(device, schedule.options.kernel, schedule.options.footprint),
       strategy_(strategy_row(schedule.options.strategy).make({device, schedule_, extent_})),
       average_(device),
-      probe_(schedule),
+      degree_probe_(schedule),
+      shutter_probe_(schedule),
       step_(device, splats_, photos_, loss_options(schedule.options, dataset), schedule.options) {
     check_batch(*ranks_.all, schedule.options.batch);
     splats_.freeze(frozen);
@@ -109,7 +111,8 @@ void Trainer::reschedule(const Schedule& next) {
     schedule_ = next;
     optimizer_.set_schedule(next);
     memory_.set_schedule(next);
-    probe_.set_schedule(next);
+    degree_probe_.set_schedule(next);
+    shutter_probe_.set_schedule(next);
     if (cameras_) cameras_->set_iterations(next.options.iterations);
     strategy_ = strategy_row(next.options.strategy).make({*device_, schedule_, extent_});
     strategy_->set_kernel(splats_.kernel());
@@ -129,8 +132,19 @@ glm::vec3 Trainer::background_for(int iteration) const {
     return colour;
 }
 
+// Each photo is visited once in a round of them, but the faces of a panorama share an exposure.
+int Trainer::exposure_visits(int iteration, std::uint32_t exposure) {
+    if (photos_.exposures() == photos_.count())
+        return (iteration - 1) / static_cast<int>(photos_.count()) + 1;
+    const std::vector<int>& views = photos_.views();
+    return std::max(1, order_.visits(iteration, [&](int view) {
+        const auto photo = std::ranges::lower_bound(views, view) - views.begin();
+        return photos_.exposure(static_cast<std::size_t>(photo)) == exposure;
+    }));
+}
+
 // last: of the step, whose rates and degree all of its views have.
-StepInput Trainer::input_for(int iteration, int view, int last) const {
+StepInput Trainer::input_for(int iteration, int view, int last) {
     StepInput input;
     input.iteration = iteration;
     input.view = photos_.view(view, degree_at(last), background_for(iteration));
@@ -141,7 +155,7 @@ StepInput Trainer::input_for(int iteration, int view, int last) const {
     input.exposure_rate = static_cast<float>(schedule_.exposure_rate(iteration));
     if (schedule_.lays_on_surfaces(iteration))
         input.distortion_weight = schedule_.options.distortion_weight;
-    input.exposure_visits = (iteration - 1) / static_cast<int>(photos_.count()) + 1;
+    input.exposure_visits = exposure_visits(iteration, input.view.exposure);
     input.strategy = strategy_.get();
     return input;
 }
@@ -179,19 +193,19 @@ void Trainer::run_batch() {
     const std::vector<StepOutcome> outcomes =
         run_batch_step(step_, *tree_, splats_, views, *ranks_.all, schedule_.options.batch);
     iteration_ = end;
-    if (cameras_) refine_cameras(views, outcomes);
+    if (cameras_) refine_cameras(iteration_, views, outcomes);
     for (const StepOutcome& outcome : outcomes) finish(outcome);
 }
 
-void Trainer::refine_cameras(const std::vector<StepInput>& views,
-                             const std::vector<StepOutcome>& outcomes) {
+void Trainer::refine_cameras(int iteration, const std::vector<StepInput>& views,
+                             const std::vector<StepOutcome>& outcomes, double share) {
     std::vector<CameraVisit> visits;
     for (std::size_t i = 0; i < views.size(); ++i) {
         const int view = static_cast<int>(views[i].view.frame.index);
         visits.push_back({view, camera_gradient(photos_.camera(view), outcomes[i].camera),
                           views[i].view.width(), views[i].view.height()});
     }
-    if (cameras_->step(iteration_, visits)) place_cameras();
+    if (cameras_->step(iteration, visits, share)) place_cameras();
 }
 
 void Trainer::place_cameras() {
@@ -213,11 +227,13 @@ void Trainer::open_step() {
     turns_.controlled =
         iteration_;  // a probe that fails is tried again, the round before it is not
     update_smoothing();
-    const bool probes = probe_.is_due(iteration_, splats_.sh_degree());
-    if (probes) probe_degree();
+    const bool degree = degree_probe_.is_due(iteration_, splats_.sh_degree());
+    const bool shutter = cameras_ && !cameras_->shutters() && shutter_probe_.is_due(iteration_);
+    if (degree) probe_degree();
+    if (shutter) probe_shutter();
     turns_.opened = iteration_;
     const std::optional<DensityResult> round = std::exchange(turns_.round, std::nullopt);
-    if ((round || probes) && ranks_.mixed) follow_first();
+    if ((round || degree || shutter) && ranks_.mixed) follow_first();
     if (round && on_round) on_round(iteration_, *round);
 }
 
@@ -389,8 +405,8 @@ void Trainer::update_smoothing() {
 }
 
 // The run goes on from what the probe makes of its state, or from that state where one of its steps
-// throws, as a loss of the caller's may.
-void Trainer::probe_degree() {
+// throws, as a loss of the caller's may. probe sets what a step of the trial is.
+void Trainer::fork(const std::function<void(State& tried, ProbeFork fork)>& probe) {
     State tried = state();
     // What a trial finishes is no result of the run.
     auto on_finished = std::exchange(step_.on_finished, [this](const StepOutcome& outcome) {
@@ -401,25 +417,94 @@ void Trainer::probe_degree() {
         restore(tried);
         turns_.controlled = iteration_;
     });
-    const ProbeFork fork{
-        .restore = [this](const State& start) { restore(start); },
-        .step =
-            [this](int iteration, int view, float share) {
-                StepInput input = input_for(iteration, view, iteration);
-                const AdamStep usual = input.adam;
-                input.adam = optimizer_.trial_step(iteration, share);
-                input.adam.clearance = usual.clearance;
-                input.adam.splats_gone = usual.splats_gone;
-                step_.run(input);
-            },
-        .photo_psnr =
-            [this](int view) {
-                drain();
-                return psnr_of(step_.photo_mse(photos_.view(view, sh_degree(), background())));
-            }};
+    probe(tried,
+          {.restore = [this](const State& start) { restore(start); },
+           .step = {},
+           .fit = {},
+           .photo_psnr =
+               [this](int view) {
+                   drain();
+                   return psnr_of(step_.photo_mse(photos_.view(view, sh_degree(), background())));
+               }});
+}
+
+StepInput Trainer::trial_input(int iteration, int view, float share) {
+    StepInput input = input_for(iteration, view, iteration);
+    const AdamStep usual = input.adam;
+    input.adam = optimizer_.trial_step(iteration, share);
+    input.adam.clearance = usual.clearance;
+    input.adam.splats_gone = usual.splats_gone;
+    return input;
+}
+
+void Trainer::probe_degree() {
     bool has_room = memory_.has_room_for_degree(held(), splats_.sh_degree() + 1);
     if (ranks_.several()) has_room = least(*ranks_.all, has_room ? 1 : 0) == 1;
-    probe_.run(tried, photos_.views(), has_room, fork);
+    fork([&](State& tried, ProbeFork trial) {
+        trial.step = [this](int iteration, int view, float share) {
+            step_.run(trial_input(iteration, view, share));
+        };
+        probed_.push_back(degree_probe_.run(tried, photos_.views(), has_room, trial));
+    });
+}
+
+// One view a step, by every rank alike.
+void Trainer::train_camera_trial(int iteration, int view, float share) {
+    std::vector<StepInput> views{trial_input(iteration, view, share)};
+    const std::vector<StepOutcome> outcomes =
+        run_batch_step(step_, *tree_, splats_, views, alone_, 1);
+    refine_cameras(iteration, views, outcomes, double{share});
+    check_gradients(outcomes.back(), splats_.count());
+}
+
+// A photo set aside has a pose and a motion of its own, which nothing but the photo tells. So in
+// both arms its camera is fitted to half of its rows, the splats as they are, and the other half
+// judges.
+
+// The gradients of a view by the error in some of its rows, for its camera.
+StepOutcome Trainer::band_gradients(StepInput input, RowBands bands, double& squared) {
+    auto given =
+        std::exchange(step_.picture_gradient, [&](const ImageF& picture, const StepInput& of) {
+            ImageU8 photo(of.view.width(), of.view.height(), 4);
+            of.view.pixels->download(std::as_writable_bytes(std::span(photo.data)));
+            BandError error = band_error(picture, photo, of.view.frame.background,
+                                         schedule_.options.alpha && alpha_is_mask_, bands);
+            squared = error.squared;
+            return std::move(error.d_image);
+        });
+    const ScopeGuard back([&] { step_.picture_gradient = std::move(given); });
+    tree_->reserve(splats_);
+    tree_->begin();
+    input.gradients = &tree_->leaf();
+    return step_.run_view(input);
+}
+
+void Trainer::fit_camera(int iteration, int view, float share) {
+    double squared = 0;
+    const std::vector<StepInput> views{trial_input(iteration, view, share)};
+    const StepOutcome outcome = band_gradients(views[0], RowBands::fitted, squared);
+    refine_cameras(iteration, views, {outcome}, double{share});
+}
+
+double Trainer::judged_psnr(int view) {
+    double squared = 0;
+    band_gradients(input_for(iteration_ + 1, view, iteration_ + 1), RowBands::judged, squared);
+    return psnr_of(squared);
+}
+
+void Trainer::probe_shutter() {
+    fork([&](State& tried, ProbeFork trial) {
+        trial.fit = [this](int iteration, int view, float share) {
+            fit_camera(iteration, view, share);
+        };
+        trial.photo_psnr = [this](int view) { return judged_psnr(view); };
+        trial.step = [this](int iteration, int view, float share) {
+            train_camera_trial(iteration, view, share);
+        };
+        State rolling = tried;
+        rolling.cameras = cameras_->with_shutters(tried.cameras);
+        probed_.push_back(shutter_probe_.run(tried, rolling, photos_.views(), trial));
+    });
 }
 
 // The last iteration leaves the mean itself. Where there is no room for one the run goes on
@@ -466,7 +551,8 @@ std::map<std::string, ColourMap> Trainer::exposures() {
     if (!step_.exposure()) return named;
     drain();
     const std::vector<ColourMap> maps = step_.exposure()->maps();
-    for (size_t p = 0; p < maps.size(); ++p) named[photos_.name(photos_.views()[p])] = maps[p];
+    for (size_t p = 0; p < photos_.count(); ++p)
+        named[photos_.name(photos_.views()[p])] = maps[photos_.exposure(p)];
     return named;
 }
 
@@ -481,7 +567,7 @@ Trainer::State Trainer::state() {
     drain();
     s.model = splats_.download();
     s.iteration = iteration_;
-    s.next_probe = probe_.next();
+    s.next_probe = degree_probe_.next();
     if (smoothing_) s.smoothing = splats_.smoothing().download<float>(splats_.count());
     if (step_.exposure()) s.exposure = step_.exposure()->state();
     if (cameras_) s.cameras = cameras_->state();
@@ -517,13 +603,14 @@ void Trainer::restore(const State& s) {
     const std::uint32_t frozen = splats_.frozen();
     if (cameras_ && !s.cameras.empty()) {
         cameras_->restore(s.cameras);
+        step_.set_shutter(cameras_->shutters());
         place_cameras();
     }
     splats_ = GpuSplats();  // first, so that there are never two
     splats_ = GpuSplats(*device_, s.model, true, schedule_.rest_every > 1);
     splats_.freeze(frozen);
     if (profile_) splats_.set_kernel(profile_->kernel());
-    probe_.set_next(s.next_probe);
+    degree_probe_.set_next(s.next_probe);
     if (smoothing_) {
         smoothing_->update(splats_);
         if (!s.smoothing.empty()) splats_.smoothing().upload(s.smoothing);

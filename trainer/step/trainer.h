@@ -6,6 +6,7 @@
 // inside.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -46,6 +47,17 @@ class ViewOrder {
         const int epoch = (iteration - 1) / count;
         if (epoch != epoch_) shuffle(epoch);
         return order_[(iteration - 1) % count];
+    }
+
+    /// How many of the iterations 1 to `iteration` have a view for which is_one holds.
+    template <class IsOne>
+    int visits(int iteration, IsOne is_one) {
+        const int last = view(iteration);  // order_ is that of its epoch
+        const int count = static_cast<int>(views_.size());
+        const auto end = order_.begin() + (iteration - 1) % count;
+        return epoch_ * static_cast<int>(std::ranges::count_if(views_, is_one)) +
+               static_cast<int>(std::count_if(order_.begin(), end, is_one)) +
+               (is_one(last) ? 1 : 0);
     }
 
   private:
@@ -146,10 +158,13 @@ class Trainer {
     SplatModel model();
     /// A picture of model(), RGB not clamped.
     ImageF render(const Camera& camera);
-    /// The exposure of each training photo by the view's name; empty where it is off.
+    /// The exposure of each training view by its name, the same for all faces of a panorama; empty
+    /// where it is off.
     std::map<std::string, ColourMap> exposures();
     /// The camera of a view of the data set as training has it now.
     const Camera& camera(std::size_t view) const { return photos_.camera(static_cast<int>(view)); }
+    /// The effects of its pictures now, which a probe may have changed.
+    const ProjectionEffects& effects() const { return step_.effects(); }
     /// How far cameras have come; nothing where they are not refined.
     std::optional<CameraMoves> camera_moves() const;
     /// The state that a checkpoint holds, the model included.
@@ -159,7 +174,7 @@ class Trainer {
     const TrainCounters& counters() const { return totals_.counters; }
     const std::vector<PassTotal>& pass_totals() const { return totals_.passes; }
     std::uint64_t timed_iterations() const { return totals_.timed_iterations; }
-    const std::vector<Probe>& probes() const { return probe_.results(); }
+    const std::vector<Probe>& probes() const { return probed_; }
     /// What stopped the growth, see MemoryBudget.
     std::uint32_t stopped_by_memory() const { return memory_.stopped_by_memory(); }
     std::uint32_t stopped_by_intersections() const { return memory_.stopped_by_intersections(); }
@@ -171,11 +186,12 @@ class Trainer {
   private:
     int degree_at(int iteration) const;
     glm::vec3 background_for(int iteration) const;
-    StepInput input_for(int iteration, int view, int last) const;
+    StepInput input_for(int iteration, int view, int last);
+    int exposure_visits(int iteration, std::uint32_t exposure);
     void run_step();
     void run_batch();
-    void refine_cameras(const std::vector<StepInput>& views,
-                        const std::vector<StepOutcome>& outcomes);
+    void refine_cameras(int iteration, const std::vector<StepInput>& views,
+                        const std::vector<StepOutcome>& outcomes, double share = 1);
     void place_cameras();
     void finish(const StepOutcome& outcome);
     std::optional<DensityResult> control_density();
@@ -192,7 +208,14 @@ class Trainer {
     void reorder();
     void set_resolution(int iteration);
     void update_smoothing();
+    StepInput trial_input(int iteration, int view, float share);
+    void train_camera_trial(int iteration, int view, float share);
+    StepOutcome band_gradients(StepInput input, RowBands bands, double& squared);
+    void fit_camera(int iteration, int view, float share);
+    double judged_psnr(int view);
+    void fork(const std::function<void(State& tried, ProbeFork fork)>& probe);
     void probe_degree();
+    void probe_shutter();
     void average();
     HeldMemory held() const;
 
@@ -201,6 +224,7 @@ class Trainer {
     RankGroup ranks_;
     Schedule schedule_;
     double extent_;  // the scene's extent
+    bool alpha_is_mask_;
     MemoryBudget memory_;
     GpuSplats splats_;
     TrainingPhotos photos_;
@@ -212,7 +236,9 @@ class Trainer {
     IterateAverage average_;
     bool mean_left_out_ = false;
     std::optional<TrainedSmoothing> smoothing_;  // options.antialias
-    DegreeProbe probe_;
+    DegreeProbe degree_probe_;
+    ShutterProbe shutter_probe_;
+    std::vector<Probe> probed_;
     RunTotals totals_;
     int iteration_ = 0;
     struct Turns {                           // the iterations after which these had theirs

@@ -45,6 +45,7 @@ struct FakeRun {
                         trained.push_back(view);
                         shares.push_back(share);
                     },
+                .fit = {},
                 .photo_psnr =
                     [this](int view) {
                         compared.push_back(view);
@@ -102,14 +103,14 @@ TEST(DegreeProbe, a_gain_admits_the_degree_and_tries_the_next_an_interval_later)
     DegreeProbe probe{Schedule(options)};
     FakeRun run{.gain_db = 0.5};
     TrainerState state = state_at(1'000);
-    probe.run(state, views(20), true, run.fork());
+    const ProbeResult result = probe.run(state, views(20), true, run.fork());
     EXPECT_EQ(state.model.sh_degree, 1);
     EXPECT_EQ(state.next_probe, 2'000);
     EXPECT_EQ(state.averaged, 0U) << "the mean begins anew";
-    ASSERT_EQ(probe.results().size(), 1U);
-    EXPECT_TRUE(probe.results()[0].admitted);
-    EXPECT_EQ(probe.results()[0].degree, 1);
-    EXPECT_NEAR(probe.results()[0].gain_db, 0.5, 1e-9);
+    EXPECT_TRUE(result.admitted);
+    EXPECT_EQ(result.effect, EFFECT_VIEW_COLOUR);
+    EXPECT_EQ(result.degree, 1);
+    EXPECT_NEAR(result.gain_db, 0.5, 1e-9);
 }
 
 TEST(DegreeProbe, a_loss_leaves_the_state_and_tries_again_after_as_many_iterations) {
@@ -122,9 +123,8 @@ TEST(DegreeProbe, a_loss_leaves_the_state_and_tries_again_after_as_many_iteratio
     EXPECT_EQ(state.next_probe, 2'000);
     EXPECT_EQ(state.averaged, 3U);
     state.iteration = 2'000;
-    probe.run(state, views(20), true, run.fork());
+    EXPECT_FALSE(probe.run(state, views(20), true, run.fork()).admitted);
     EXPECT_EQ(state.next_probe, 4'000);
-    EXPECT_FALSE(probe.results()[1].admitted);
 }
 
 TEST(DegreeProbe, nothing_is_trained_where_nothing_can_be_measured) {
@@ -133,10 +133,89 @@ TEST(DegreeProbe, nothing_is_trained_where_nothing_can_be_measured) {
         DegreeProbe probe{Schedule(options)};
         FakeRun run{.gain_db = 0};
         TrainerState state = state_at(1'000);
-        probe.run(state, views(has_room ? 7 : 20), has_room, run.fork());
+        const ProbeResult result = probe.run(state, views(has_room ? 7 : 20), has_room, run.fork());
         EXPECT_TRUE(run.restored.empty());
-        EXPECT_EQ(probe.results()[0].admitted, has_room) << "few photos admit, no room refuses";
-        EXPECT_TRUE(std::isnan(probe.results()[0].gain_db));
+        EXPECT_EQ(result.admitted, has_room) << "few photos admit, no room refuses";
+        EXPECT_TRUE(std::isnan(result.gain_db));
+    }
+}
+
+TrainOptions trying_shutters() {
+    TrainOptions options;
+    options.iterations = 10'000;
+    options.refine_cameras = options.probe_shutter = true;
+    return options;
+}
+
+TEST(ShutterProbe, is_due_once_after_cameras_began_to_move) {
+    const ShutterProbe probe{Schedule(trying_shutters())};
+    const int at = ShutterProbe::at(Schedule(trying_shutters()));
+    EXPECT_GT(at, 1'000);
+    EXPECT_FALSE(probe.is_due(at - 1));
+    EXPECT_TRUE(probe.is_due(at));
+    EXPECT_FALSE(probe.is_due(at + 1));
+    TrainOptions late = trying_shutters();
+    late.camera_from = 0.8f;
+    EXPECT_GT(ShutterProbe::at(Schedule(late)), 8'000);
+    EXPECT_EQ(ShutterProbe::at(Schedule(probing())), 0) << "of a run that does not try";
+    EXPECT_FALSE(ShutterProbe{Schedule(probing())}.is_due(0));
+}
+
+// Photos set aside are visited by their cameras alone, and judge.
+TEST(ShutterProbe, a_gain_on_photos_set_aside_admits_the_state_that_rolls) {
+    for (const double gain : {0.3, -0.3}) {
+        const ShutterProbe probe{Schedule(trying_shutters())};
+        FakeRun run{.gain_db = 0};
+        std::vector<int> fitted;
+        ProbeFork fork = run.fork();
+        fork.fit = [&](int, int view, float) { fitted.push_back(view); };
+        fork.photo_psnr = [&](int view) {
+            run.compared.push_back(view);
+            return 20 + (run.restored.back().cameras.empty() ? 0 : gain);
+        };
+        TrainerState state = state_at(3'500), rolling = state;
+        rolling.cameras = {1.0f};
+        const ProbeResult result = probe.run(state, rolling, views(20), fork);
+        EXPECT_EQ(result.effect, EFFECT_SHUTTER);
+        EXPECT_NEAR(result.gain_db, gain, 1e-9);
+        EXPECT_EQ(result.admitted, gain > 0);
+        EXPECT_EQ(state.cameras.size(), gain > 0 ? 1U : 0U);
+        const std::set<int> trained(run.trained.begin(), run.trained.end());
+        for (const int view : fitted) EXPECT_FALSE(trained.contains(view)) << view;
+        EXPECT_EQ(std::set<int>(fitted.begin(), fitted.end()),
+                  std::set<int>(run.compared.begin(), run.compared.end()));
+    }
+}
+
+TEST(ShutterProbe, too_few_photos_refuse_unmeasured) {
+    FakeRun run{.gain_db = 0};
+    TrainerState state = state_at(3'500), rolling = state;
+    rolling.cameras = {1.0f};
+    const ProbeResult result =
+        ShutterProbe{Schedule(trying_shutters())}.run(state, rolling, views(7), run.fork());
+    EXPECT_FALSE(result.admitted);
+    EXPECT_TRUE(std::isnan(result.gain_db));
+    EXPECT_TRUE(state.cameras.empty());
+    EXPECT_TRUE(run.restored.empty());
+}
+
+TEST(RowBands, each_half_of_the_rows_counts_alone) {
+    ImageF image(3, 16, 3);
+    ImageU8 photo(3, 16, 4);
+    for (size_t p = 0; p < 3 * 16; ++p) {
+        photo.data[4 * p + 3] = p % 3 == 2 ? 0 : 255;  // a masked column
+        const bool fitted = p / 3 / 2 % 2 == 0;        // two rows a band
+        for (size_t c = 0; c < 3; ++c) image.data[3 * p + c] = fitted ? 0.5f : -0.25f;
+    }
+    const BandError fitted = band_error(image, photo, glm::vec3(0.0f), true, RowBands::fitted);
+    const BandError judged = band_error(image, photo, glm::vec3(0.0f), true, RowBands::judged);
+    EXPECT_NEAR(fitted.squared, 0.25, 1e-9);
+    EXPECT_NEAR(judged.squared, 0.0625, 1e-9);
+    const float each = 1.0f / (2 * 8 * 3);  // two columns, eight rows
+    for (size_t p = 0; p < 3 * 16; ++p) {
+        const bool counts = p % 3 != 2, first = p / 3 / 2 % 2 == 0;
+        EXPECT_EQ(fitted.d_image.data[3 * p], counts && first ? each : 0.0f) << p;
+        EXPECT_EQ(judged.d_image.data[3 * p], counts && !first ? -each : 0.0f) << p;
     }
 }
 

@@ -39,5 +39,25 @@ TEST(ViewOrder, follows_the_seed_and_the_epoch) {
     EXPECT_NE(of(3, 1), of(3, 7));
 }
 
+TEST(ViewOrder, counts_the_visits_of_some_views) {
+    ViewOrder order(kViews, 3);
+    const auto is_one = [](int view) { return view == 4 || view == 9; };
+    int visits = 0;
+    for (int i = 1; i <= 20; ++i) {
+        visits += is_one(order.view(i)) ? 1 : 0;
+        EXPECT_EQ(order.visits(i, is_one), visits) << i;
+    }
+}
+
+TEST(ExposureNumbers, are_one_a_photo_and_faces_of_a_panorama_are_one_photo) {
+    std::vector<View> views(8);
+    for (size_t v = 0; v < views.size(); ++v) views[v].photo = v < 4 ? "a.jpg" : "b.jpg";
+    for (const size_t v : {0, 1, 2, 4, 5}) views[v].face = static_cast<int>(v);
+    views[1].is_test = true;  // and 3, 6 and 7 are flat photos, whatever they are named
+    EXPECT_EQ(exposure_numbers(views), (std::vector<std::uint32_t>{0, 0, 1, 2, 2, 3, 4}));
+    EXPECT_EQ(exposure_count(views), 5U);
+    EXPECT_EQ(exposure_count({}), 0U);
+}
+
 }  // namespace
 }  // namespace darb
