@@ -77,7 +77,7 @@ step bench 15 "$darb" bench 'random_100k|sort/|scan/|tuning' "${device[@]}" --se
 step filled 5 "$darb" bench 'train/(filled|trained)' "${device[@]}" --seconds 0.5 --samples 5 --json "$out/filled.json"
 # Every form of passes for few, large splats, on a scene that has such; the first row is the device's own choice.
 trained_forms() {
-    for forms in '' depths=four,emit=splats,tiles=rows,sums=splats depths=three emit=slots tiles=longest sums=chunks depths=three,emit=slots,tiles=longest,sums=chunks; do
+    for forms in '' lists=digits,depths=four,emit=splats,tiles=rows,sums=splats lists=counts depths=three emit=slots tiles=longest sums=chunks lists=counts,depths=three,emit=slots,tiles=longest,sums=chunks; do
         echo "--tune ${forms:-(as measured)}"
         DARB_TUNE=$forms "$darb" bench train/trained "${device[@]}" --seconds 0.3 --samples 5 || return
     done

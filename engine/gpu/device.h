@@ -67,6 +67,7 @@ struct Tuning {
     std::uint32_t blend_lanes = 0;  // lanes of a subgroup in both blends; 0: the device's own
     BackwardBlend backward = BackwardBlend::subgroup;
     LossWay loss = LossWay::strips;
+    bool count_lists = false;     // lists of tiles by one counting pass: TileLists
     bool short_depths = false;    // depth keys of SHORT_DEPTH_BITS, sorted by three digits
     bool emit_by_slots = false;   // a thread for each intersection: emit_slots.comp
     bool sums_by_chunks = false;  // of the partials of large splats: partial_chunks.comp

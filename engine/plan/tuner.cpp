@@ -147,6 +147,7 @@ std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
         {"scatter",
          usual_first(kSortScatters, usual_tuning(info).scatter),
          {"depth sort", "tile sort"}},
+        {"lists", {"digits", "counts"}, {"tile sort", "tile ranges"}},
         {"depths", {"four", "three"}, {"compact", "depth sort"}},
         {"emit", {"splats", "slots"}, {"emit"}},
         {"tiles", {"rows", "longest"}, {"tile ranges", "blend", "blend backward"}},
@@ -181,8 +182,8 @@ TuningNames checkpoint_tuning(const DeviceInfo& info, std::string_view text,
 
 std::string names_text(const TuningNames& names) {
     std::string text;
-    for (const char* name : {"scan", "scatter", "depths", "emit", "tiles", "blend", "backward",
-                             "sums", "loss", "exp", "photos", "lanes"})
+    for (const char* name : {"scan", "scatter", "lists", "depths", "emit", "tiles", "blend",
+                             "backward", "sums", "loss", "exp", "photos", "lanes"})
         if (const auto found = names.find(name); found != names.end())
             text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, found->second);
     return text;
@@ -192,6 +193,7 @@ TuningNames tuning_names(const Tuning& tuning) {
     TuningNames names{
         {"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
         {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
+        {"lists", tuning.count_lists ? "counts" : "digits"},
         {"depths", tuning.short_depths ? "three" : "four"},
         {"emit", tuning.emit_by_slots ? "slots" : "splats"},
         {"tiles", tuning.longest_first ? "longest" : "rows"},
@@ -209,6 +211,7 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
     for (const auto& [name, choice] : names) {
         if (name == "scan") tuning.scan_by_thread = choice == "thread";
         if (name == "scatter") tuning.scatter = named<SortScatter>(kSortScatters, choice);
+        if (name == "lists") tuning.count_lists = choice == "counts";
         if (name == "depths") tuning.short_depths = choice == "three";
         if (name == "emit") tuning.emit_by_slots = choice == "slots";
         if (name == "tiles") tuning.longest_first = choice == "longest";

@@ -296,6 +296,14 @@ void Forward::record_tiles(Commands& commands, const gpu::IntersectionArgs& args
     const FrameCounters& c = frame.counters;
     const TileIntersections& t = frame.intersections;
     commands.pass("tile sort");
+    if (frame.sorts.lists) {
+        frame.sorts.lists->record(
+            commands,
+            {c.intersections_in_use, t.tile, t.intersection_from_sorted, t.tile_range, c.status},
+            args.tile_count, args.list_capacity);
+        if (longest_first_) commands.dispatch(tile_order_, args, {t.tile_range}, 1);
+        return;
+    }
     commands.fill(t.tile_range, 0);  // beside the sort
     frame.sorts.by_tile->record(commands, t.tile, t.intersection_from_sorted,
                                 c.intersections_in_use, 0, bits_for(args.tile_count), true);

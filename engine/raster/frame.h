@@ -10,6 +10,7 @@
 #include "engine/gpu/buffer.h"
 #include "engine/primitives/radix_sort.h"
 #include "engine/primitives/scan.h"
+#include "engine/raster/tile_lists.h"
 #include "shaders/shared/render_args.h"
 
 namespace darb {
@@ -69,7 +70,7 @@ struct ProjectedSplats {
 
 /// Which splats a tile has, nearest first.
 struct TileIntersections {
-    Buffer tile;                      // [K] sorted
+    Buffer tile;  // [K] sorted, but with FrameSorts::lists in the order of emission
     Buffer splat_from_intersection;   // [K] in the order of emission: splat and blocks of the tile
     Buffer intersection_from_sorted;  // [K] by tile, then by depth
     Buffer tile_range;                // [T][2] of that; then the tiles in the order of the blends
@@ -88,7 +89,9 @@ struct FrameImages {
 /// Scratch memory of the sorts, each for a capacity.
 struct FrameSorts {
     std::optional<Scan> scan;
-    std::optional<RadixSort> by_depth, by_tile;
+    std::optional<RadixSort> by_depth;
+    std::optional<RadixSort> by_tile;  // one of these two
+    std::optional<TileLists> lists;    // by Tuning::count_lists, where the tiles fit
 };
 
 struct Frame {

@@ -37,6 +37,11 @@ std::uint32_t most_intersections(const Device& device, const ForwardOptions& opt
                         device.info().max_storage_buffer_bytes / 8, 1u << 30)));
 }
 
+// Whether lists are counted: else sorted by digits.
+bool counts_lists(const Device& device, std::uint32_t intersections, std::uint32_t tiles) {
+    return device.tuning().count_lists && TileLists::fits(device.info(), intersections, tiles);
+}
+
 int depth_digit_bits(const Device& device) {
     return device.tuning().short_depths ? RadixSort::kWideDigitBits : RadixSort::kDigitBits;
 }
@@ -145,7 +150,9 @@ FrameBytes FrameBuffers::device_bytes(const Device& device, const ForwardOptions
                    Scan::device_bytes(size.splats) +
                    RadixSort::device_bytes(device, size.splats, depth_digit_bits(device));
     bytes.intersections = charged_bytes(intersection_buffers(size.intersections)) +
-                          RadixSort::device_bytes(device, size.intersections);
+                          (counts_lists(device, size.intersections, size.tiles)
+                               ? TileLists::device_bytes(size.intersections, size.tiles)
+                               : RadixSort::device_bytes(device, size.intersections));
     if (size.cooperates) bytes.intersections += charged_bytes(huge_buffers(size.intersections));
     bytes.intersections += charged_bytes(checkpoint_buffers(size));
     bytes.images = charged_bytes(counter_buffers()) + charged_bytes(no_huge_buffers()) +
@@ -183,6 +190,7 @@ void FrameBuffers::reserve(std::uint32_t splats, std::uint32_t intersections, in
     if (intersections > size.intersections || size.intersections == 0)
         reserve_intersections(std::max(intersections, kMinCapacity));
     reserve_image(width, height);
+    make_tile_sort();
     if (size.checkpoint_records() > frame_.checkpoint_records())
         make_buffers(*device_, frame_.images, checkpoint_buffers(size), "blend");
 }
@@ -200,10 +208,25 @@ void FrameBuffers::reserve_splats(std::uint32_t splats) {
 void FrameBuffers::reserve_intersections(std::uint32_t intersections) {
     frame_.size.intersections = 0;
     frame_.sorts.by_tile.reset();
+    frame_.sorts.lists.reset();
     make_buffers(*device_, frame_.intersections, intersection_buffers(intersections), "emit");
-    frame_.sorts.by_tile.emplace(*device_, intersections);
     frame_.size.intersections = intersections;
     if (frame_.size.cooperates) make_huge_buffers();
+}
+
+// Of what was made before, nothing stays beside it.
+void FrameBuffers::make_tile_sort() {
+    const FrameSize& size = frame_.size;
+    FrameSorts& sorts = frame_.sorts;
+    if (counts_lists(*device_, size.intersections, size.tiles)) {
+        if (sorts.lists && sorts.lists->tiles() >= size.tiles) return;
+        sorts.by_tile.reset();
+        sorts.lists.reset();
+        sorts.lists.emplace(*device_, size.intersections, size.tiles);
+    } else if (!sorts.by_tile) {
+        sorts.lists.reset();
+        sorts.by_tile.emplace(*device_, size.intersections);
+    }
 }
 
 void FrameBuffers::reserve_image(int width, int height) {

@@ -51,6 +51,7 @@ class FrameBuffers {
     void reserve_splats(std::uint32_t splats);
     void reserve_intersections(std::uint32_t intersections);
     void reserve_image(int width, int height);
+    void make_tile_sort();
     void make_huge_buffers();
     bool within_budget(std::uint32_t intersections) const;
     void grow(std::uint32_t wanted, std::uint32_t most,

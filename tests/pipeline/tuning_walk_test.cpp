@@ -70,8 +70,8 @@ TEST(TuningWalk, ways_for_large_splats_repeat_and_agree) {
                        .seed = 23});
     const DeviceWalk usual = s.walk();
     ASSERT_GT(usual.status.huge_splats, 0U);
-    for (const char* way :
-         {"depths=three", "emit=slots", "tiles=longest", "depths=three,emit=slots,tiles=longest"}) {
+    for (const char* way : {"depths=three", "emit=slots", "tiles=longest", "lists=counts",
+                            "lists=counts,depths=three,emit=slots,tiles=longest"}) {
         const ScopedVariants variants(shared_device(), way);
         const DeviceWalk walk = s.walk();
         EXPECT_EQ(walk.image.data, usual.image.data) << way;

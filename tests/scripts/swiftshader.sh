@@ -20,7 +20,7 @@ printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_vers
 on_swiftshader=(env "VK_DRIVER_FILES=$folder/icd.json" "VK_ICD_FILENAMES=$folder/icd.json" "XDG_CACHE_HOME=$folder")
 passes=blend=16x16,backward=team,loss=tiles,exp=polynomial
 if [[ $2 == check ]]; then
-    large=depths=three,emit=slots,tiles=longest,sums=chunks
+    large=lists=counts,depths=three,emit=slots,tiles=longest,sums=chunks
     "${on_swiftshader[@]}" "DARB_TUNE=scan=subgroup,scatter=ballot,$large,$passes" "$darb" check >"$folder/check" || {
         grep -B 3 FAIL "$folder/check" | head -60
         exit 1
@@ -29,7 +29,7 @@ if [[ $2 == check ]]; then
     exit
 fi
 
-plain=depths=four,emit=splats,tiles=rows,sums=splats
+plain=lists=digits,depths=four,emit=splats,tiles=rows,sums=splats
 train() { "$@" train assets/scene -q --no-report -r 25 --iterations 50 --eval -o "$folder/$name" >/dev/null; }
 name=own train "$darb"
 name=swiftshader train "${on_swiftshader[@]}" "DARB_TUNE=scan=thread,scatter=columns,$plain,$passes" "$darb"
