@@ -16,6 +16,7 @@ ForwardOptions forward_options(const SplatModel& model, const WalkSettings& sett
     options.storage = settings.storage;
     options.depth_order = settings.depth_order;
     options.projection = settings.projection;
+    options.arithmetic = settings.arithmetic;
     options.alpha_cutoff = settings.alpha_cutoff;
     options.transmittance_stop = settings.transmittance_stop;
     options.store_for_backward = settings.depth_order != DEPTH_ORDER_PIXEL;

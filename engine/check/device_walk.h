@@ -27,6 +27,7 @@ struct WalkSettings {
     int storage = STORAGE_FLOAT32;
     int depth_order = DEPTH_ORDER_CENTRE;  // DEPTH_ORDER_PIXEL: forward only
     int projection = PROJECTION_JACOBIAN;
+    int arithmetic = ARITHMETIC_FLOAT32;
     float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
     glm::vec3 background{0.0f};

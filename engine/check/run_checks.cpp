@@ -70,7 +70,19 @@ struct Variant {
     int kernel;
     Footprint footprint = Footprint::psi;
     int evaluation = EVALUATION_POLYNOMIAL;
+    int arithmetic = ARITHMETIC_FLOAT32;
 };
+
+// What a device can blend in half precision, of these kernels.
+void add_half_variants(const Device& device, std::vector<Variant>& all) {
+    if (!device.info().half_arithmetic) return;
+    std::vector<Variant> halves;
+    for (const Variant& v : all)
+        if (has_half_blend(v.kernel) && v.footprint == Footprint::psi &&
+            v.evaluation == EVALUATION_POLYNOMIAL)
+            halves.push_back({v.kernel, v.footprint, v.evaluation, ARITHMETIC_FAST16});
+    all.insert(all.end(), halves.begin(), halves.end());
+}
 
 std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt) {
     if (one) {
@@ -136,9 +148,12 @@ std::vector<Row> run_checks(Device& device, const CheckOptions& options, const O
         checks.run([&] { return check_scan_and_sort(device); });
         checks.run([&] { return check_loss(device); });
     }
-    for (const Variant& v : variants(options.every_kernel, options.kernel))
+    std::vector<Variant> walks = variants(options.every_kernel, options.kernel);
+    add_half_variants(device, walks);
+    for (const Variant& v : walks)
         checks.run([&] {
-            return check_walk(device, v.kernel, v.footprint, v.evaluation, options.every_kernel);
+            return check_walk(device, v.kernel, v.footprint, v.evaluation, options.every_kernel,
+                              v.arithmetic);
         });
     for (const Variant& v : options.every_kernel || options.kernel
                                 ? variants(true, options.kernel)
@@ -388,23 +403,29 @@ reference::TestScene walk_scene(int kernel, Footprint footprint) {
 }  // namespace
 
 std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int evaluation,
-                            bool float_alone) {
+                            bool float_alone, int arithmetic) {
     const reference::TestScene scene = walk_scene(kernel, footprint);
     WalkSettings settings;
     settings.evaluation = evaluation;
+    settings.arithmetic = arithmetic;
     settings.background = {0.2f, 0.4f, 0.7f};
     const Image<double> weights = random_weights(scene.camera);
     const DeviceWalk walk = walk_on_device(device, scene.model, scene.camera, weights, settings);
     const WalkTruth truth = walk_in_double(scene.model, scene.camera, weights, settings);
     const std::string group =
-        fmt::format("walk, {} {}{}", kernel_name(kernel), footprint_name(footprint),
-                    evaluation == EVALUATION_BUILTIN ? ", built-in" : "");
+        fmt::format("walk, {} {}{}{}", kernel_name(kernel), footprint_name(footprint),
+                    evaluation == EVALUATION_BUILTIN ? ", built-in" : "",
+                    arithmetic == ARITHMETIC_FAST16 ? ", fast16" : "");
     const bool steep = footprint == Footprint::exact && ends_with_a_jump(kernel);
-    const char* allowed = steep ? "gradient_steep_float32" : "gradient_scaled_float32";
+    const bool half = arithmetic == ARITHMETIC_FAST16;
+    const char* allowed = half    ? "gradient_scaled_fast16"
+                          : steep ? "gradient_steep_float32"
+                                  : "gradient_scaled_float32";
+    const char* image_allowed = half ? "image_fast16" : "image_float32";
     // Rows for image, every gradient and the mean gradient, of the device or of the reference in
     // float.
     const auto compared = [&](const auto& image, const auto& got) {
-        std::vector<Row> rows{compare_row(group, "image", truth.image, image, "image_float32")};
+        std::vector<Row> rows{compare_row(group, "image", truth.image, image, image_allowed)};
         for (int a = 0; a < kAttributeCount; ++a)
             if (!truth.d[static_cast<size_t>(a)].empty())
                 rows.push_back(compare_row(group, std::string("d_") + attribute_name(a), truth.d[a],

@@ -82,6 +82,7 @@ Device::State::State(const DeviceOptions& options, bool validation)
     if (faults.storage_buffers != 0)
         info.max_storage_buffers = static_cast<std::uint32_t>(
             std::min<std::uint64_t>(info.max_storage_buffers, faults.storage_buffers));
+    if (faults.no_half) info.half_arithmetic = false;
     if (faults.own_subgroups) info.requires_subgroup_size = false;
     keep_subgroup_sizes(info);
     info.max_storage_buffer_bytes =
@@ -114,6 +115,7 @@ void Device::State::create_device(const DeviceOptions& options) {
 
     DeviceFeatures wanted;
     want_features(needs_of_all_shaders(), wanted);
+    wanted.v12.shaderFloat16 = info.half_arithmetic ? VK_TRUE : VK_FALSE;
     std::vector<const char*> extensions;
     for (const std::string& name : options.device_extensions) {
         if (!offers_extension(physical, name))
@@ -414,6 +416,12 @@ std::string missing_part(VkPhysicalDevice device, const DeviceInfo& info) {
     return buffers_trouble(info, kRendering);
 }
 
+bool half_arithmetic(VkPhysicalDevice device) {
+    DeviceFeatures offered;
+    vkGetPhysicalDeviceFeatures2(device, &offered.core);
+    return offered.v12.shaderFloat16 == VK_TRUE;
+}
+
 bool float_atomics(VkPhysicalDevice device) {
     if (!has_extension(device, VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME)) return false;
     VkPhysicalDeviceShaderAtomicFloatFeaturesEXT atomics{};
@@ -484,6 +492,7 @@ DeviceInfo describe(VkPhysicalDevice device) {
     keep_subgroup_sizes(info);
     describe_memory(device, info);
     info.float_atomics = float_atomics(device);
+    info.half_arithmetic = half_arithmetic(device);
     const int family = compute_queue_family(device);
     if (family >= 0) {
         std::uint32_t count = 0;
@@ -700,9 +709,10 @@ struct Capability {
 };
 
 #define DARB_FEATURE(path) [](DeviceFeatures& f) -> VkBool32& { return f.path; }
+constexpr std::uint32_t kHalfArithmetic = 9;  // shaders with it are not made where it is missing
 const Capability kCapabilities[] = {
     {1, "compute shaders"},
-    {9, "shaderFloat16", DARB_FEATURE(v12.shaderFloat16)},
+    {kHalfArithmetic, "shaderFloat16", DARB_FEATURE(v12.shaderFloat16)},
     {10, "shaderFloat64", DARB_FEATURE(core.features.shaderFloat64)},
     {11, "shaderInt64", DARB_FEATURE(core.features.shaderInt64)},
     {12, "shaderBufferInt64Atomics", DARB_FEATURE(v12.shaderBufferInt64Atomics)},
@@ -774,7 +784,11 @@ std::vector<ShaderNeed> shader_needs(std::span<const ShaderBinary> shaders) {
 }
 
 const std::vector<ShaderNeed>& needs_of_all_shaders() {
-    static const std::vector<ShaderNeed> needs = shader_needs(shader_table());
+    static const std::vector<ShaderNeed> needs = [] {
+        std::vector<ShaderNeed> all = shader_needs(shader_table());
+        std::erase_if(all, [](const ShaderNeed& n) { return n.capability == kHalfArithmetic; });
+        return all;
+    }();
     return needs;
 }
 

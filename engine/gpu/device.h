@@ -108,6 +108,7 @@ struct DeviceInfo {
     double timestamp_period_ns = 0;       // 0 where the queue has no timestamps
     bool unified_memory = false;          // every heap is host-visible (CPU and integrated devices)
     bool float_atomics = false;           // float32 atomic add on buffers
+    bool half_arithmetic = false;         // shaderFloat16, for the blends of fast16
     bool usable = false;
     std::string reason;  // why it was rejected, or why it ranks where it does
 };
@@ -237,7 +238,8 @@ struct ShaderNeed {
 /// Each capability once, in order of its number. Aborts on one that this file does not know, as no
 /// device could be held to it.
 std::vector<ShaderNeed> shader_needs(std::span<const ShaderBinary> shaders);
-/// The needs of all shaders in the embedded table, which is read once per process.
+/// The needs of all shaders in the embedded table, which is read once per process; without those
+/// for which a device need not have the shader (DeviceInfo::half_arithmetic).
 const std::vector<ShaderNeed>& needs_of_all_shaders();
 
 /// Turns on what these needs and this project's own Vulkan calls take, nothing else: robust access,

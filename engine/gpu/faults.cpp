@@ -31,7 +31,9 @@ void parse_one(std::string_view text, Faults& faults) {
         return;
     }
     const std::pair<std::string_view, bool*> switches[] = {
-        {"discrete", &faults.discrete}, {"own_subgroups", &faults.own_subgroups}};
+        {"discrete", &faults.discrete},
+        {"no_half", &faults.no_half},
+        {"own_subgroups", &faults.own_subgroups}};
     for (const auto& [name, value] : switches)
         if (text == name) {
             *value = true;
@@ -50,10 +52,12 @@ void parse_one(std::string_view text, Faults& faults) {
         faults.timestamp_bits = static_cast<std::uint32_t>(*bits);
         return;
     }
-    throw Error("DARB_FAULT", "\"" + std::string(text) + "\" is no fault",
-                "Write oom:BUFFER, lost:N, binding:N, allocation:N, allocations:N, buffers:N, "
-                "memory:N, timestamps:BITS, own_subgroups or discrete, separated by commas, or "
-                "unset it.");
+    throw Error(
+        "DARB_FAULT", "\"" + std::string(text) + "\" is no fault",
+        "Write oom:BUFFER, lost:N, binding:N, allocation:N, allocations:N, buffers:N, "
+        "memory:N, timestamps:BITS, own_subgroups, no_half or discrete, separated by commas, "
+        "or "
+        "unset it.");
 }
 
 }  // namespace

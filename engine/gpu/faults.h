@@ -9,6 +9,7 @@
 //   buffers:N  a shader binds at most N storage buffers
 //   timestamps:N  of a timestamp only the lowest N bits are right; 0: there are none
 //   own_subgroups  no size of subgroups can be required, the device has its own
+//   no_half    the device has no arithmetic in half precision
 //   discrete   the device has memory of its own, which the host does not reach
 //   memory:N   buffers beyond N bytes in all fail as if the device were out of memory
 // None in normal use. A text that is none of these is an Error.
@@ -32,6 +33,7 @@ struct Faults {
     std::uint64_t storage_buffers = 0;       // 0 = what the device says
     std::optional<std::uint32_t> timestamp_bits;
     bool own_subgroups = false;
+    bool no_half = false;
     bool discrete = false;
 
     /// in_all: bytes of all buffers, including this one.

@@ -34,6 +34,8 @@ constexpr AccuracyChoice kOrders[] = {{"centre", DEPTH_ORDER_CENTRE},
 constexpr AccuracyChoice kProjections[] = {{"jacobian", PROJECTION_JACOBIAN},
                                            {"unscented", PROJECTION_UNSCENTED},
                                            {"auto", PROJECTION_AUTO}};
+constexpr AccuracyChoice kArithmetics[] = {{"float32", ARITHMETIC_FLOAT32},
+                                           {"fast16", ARITHMETIC_FAST16}};
 constexpr AccuracyChoice kScales[] = {{"1", 1}, {"1/2", 0.5, false}};
 
 // The presets are choices of index: {fast, balanced, exact}.
@@ -71,6 +73,11 @@ constexpr AccuracySetting kSettings[kAccuracyCount] = {
      "jacobian: a splat's shape by the camera's slope at its centre; unscented: by sigma points; "
      "auto: by these where the slope changes within the splat",
      kProjections,
+     {0, 0, 0},
+     ""},
+    {"arithmetic",
+     "of both blends; fast16: a splat's alpha in half precision, sums in float32",
+     kArithmetics,
      {0, 0, 0},
      ""},
 };
@@ -192,6 +199,7 @@ void set_options(const Accuracy& accuracy, ForwardOptions& options) {
     options.storage = static_cast<int>(accuracy.value(kStorage));
     options.depth_order = static_cast<int>(accuracy.value(kDepthOrder));
     options.projection = static_cast<int>(accuracy.value(kSplatProjection));
+    options.arithmetic = static_cast<int>(accuracy.value(kArithmetic));
 }
 
 FrameAccuracy frame_accuracy(const Accuracy& accuracy, const SplatModel& model) {

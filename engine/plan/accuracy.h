@@ -24,6 +24,7 @@ enum AccuracySettingId {
     kDepthOrder,
     kRenderScale,
     kSplatProjection,
+    kArithmetic,
     kAccuracyCount
 };
 

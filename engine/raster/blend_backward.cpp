@@ -20,6 +20,13 @@ std::uint64_t of_a_binding(const Device& device) {
     return device.info().max_storage_buffer_bytes / kPartialBytes / 8 * 8;  // windows: 256 bytes
 }
 
+// A subgroup of so many lanes for each block of the tile.
+void add_pixel_constants(std::uint32_t lanes, SpecConstants& constants) {
+    constants["SUBGROUP_SIZE"] = static_cast<std::int32_t>(lanes);
+    constants["PIXELS"] = static_cast<std::int32_t>(64 / lanes);
+    constants["THREADS"] = static_cast<std::int32_t>(4 * lanes);
+}
+
 }  // namespace
 
 // Several bindings, but one buffer.
@@ -31,7 +38,8 @@ std::uint64_t BlendBackward::max_intersections(const Device& device) {
 BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
     : device_(&device),
       options_(options),
-      method_(device.tuning().backward),
+      half_(blends_in_half(options)),
+      method_(half_ ? BackwardBlend::pixels : device.tuning().backward),
       longest_first_(device.tuning().longest_first) {
     make_pipelines(false);
     make_buffers(device, *this, segment_buffers({}), "blend backward");
@@ -74,6 +82,10 @@ void BlendBackward::make_pipelines(bool segmented) {
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window_intersections_);
     constants = for_several_passes(std::move(constants));  // each method uses some of them
     segmented_ = segmented;
+    if (half_) {
+        make_half(std::move(constants));
+        return;
+    }
     if (is_by_pixels(method_)) {
         make_by_pixels(std::move(constants));
         return;
@@ -95,6 +107,8 @@ void BlendBackward::make_pipelines(bool segmented) {
 
 void BlendBackward::set_kernel(int kernel) {
     options_.kernel = kernel;
+    half_ = blends_in_half(options_);
+    method_ = half_ ? BackwardBlend::pixels : device_->tuning().backward;
     blend_ = {};
     make_pipelines(segmented_);
 }
@@ -108,11 +122,17 @@ void BlendBackward::make_by_pixels(SpecConstants constants) {
                         "shared memory, which {} has not",
                         kBackwardBlends[static_cast<std::size_t>(method_)], device_->info().name),
             "Use --tune backward=team.");
-    constants["SUBGROUP_SIZE"] = static_cast<std::int32_t>(lanes);
-    constants["PIXELS"] = static_cast<std::int32_t>(64 / lanes);
-    constants["THREADS"] = static_cast<std::int32_t>(4 * lanes);  // a subgroup a block
+    add_pixel_constants(lanes, constants);
     constants["BATCH"] = method_ == BackwardBlend::pixels4 ? 4 : 8;
     blend_ = Pipeline(*device_, "blend_backward_pixels", constants, true, lanes);
+}
+
+void BlendBackward::make_half(SpecConstants constants) {
+    const std::uint32_t lanes = half_blend_lanes(*device_);
+    add_pixel_constants(lanes, constants);
+    constants["EVALUATION"] = EVALUATION_BUILTIN;
+    constants["BATCH"] = 8;  // whatever the tuning, so that results depend on less
+    blend_ = Pipeline(*device_, "blend_backward_half", constants, true, lanes);
 }
 
 // A size is taken note of once its buffers are there, as in FrameBuffers.

@@ -49,6 +49,7 @@ class BlendBackward {
     static BufferList<BlendBackward> bucket_buffers(std::uint64_t records);
     void make_pipelines(bool segmented);
     void make_by_pixels(SpecConstants constants);
+    void make_half(SpecConstants constants);
     void record_lists(Commands& commands, const Frame& frame, const Buffer& d_image,
                       gpu::BlendArgs args);
     void record_buckets(Commands& commands, const Frame& frame, const Buffer& d_image,
@@ -56,6 +57,7 @@ class BlendBackward {
 
     Device* device_;
     ForwardOptions options_;
+    bool half_;  // in half precision: blend_backward_half.comp
     BackwardBlend method_;
     bool longest_first_;
     Pipeline blend_;                         // used by every method

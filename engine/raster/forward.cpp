@@ -33,6 +33,33 @@ bool is_exponential(int kernel) {
     return form == KERNEL_FORM_GAUSSIAN || form == KERNEL_FORM_EXPONENTIAL;
 }
 
+bool has_half_blend(int kernel) {
+    if (blend_parts(kernel)) return false;
+    const int form = kernel_profile(kernel).form;
+    return form == KERNEL_FORM_GAUSSIAN || form == KERNEL_FORM_GES;
+}
+
+bool blends_in_half(const ForwardOptions& options) {
+    return options.arithmetic == ARITHMETIC_FAST16 && has_half_blend(options.kernel) &&
+           options.depth_order != DEPTH_ORDER_PIXEL;
+}
+
+std::uint32_t half_blend_lanes(const Device& device) {
+    if (!device.info().half_arithmetic)
+        throw Error("arithmetic fast16",
+                    fmt::format("{} has no arithmetic in half precision (shaderFloat16)",
+                                device.info().name),
+                    "Use float32, or choose another device (darb devices).");
+    const std::uint32_t lanes = lanes_by_pixels(device.info(), blend_subgroup(device));
+    if (lanes == 0)
+        throw Error("arithmetic fast16",
+                    fmt::format("it needs subgroups of 32 lanes or fewer and 32 KiB of shared "
+                                "memory, which {} has not",
+                                device.info().name),
+                    "Use float32, or choose another device (darb devices).");
+    return lanes;
+}
+
 int evaluation_on(const Device& device, const ForwardOptions& options) {
     if (options.evaluation != kEvaluationOfDevice) return options.evaluation;
     const bool builtin = device.tuning().exp_builtin && is_exponential(options.kernel);
@@ -87,9 +114,11 @@ Forward::Forward(Device& device, const ForwardOptions& options)
       emits_slots_(device.tuning().emit_by_slots),
       longest_first_(device.tuning().longest_first),
       records_(device.tuning().blend_records),
+      half_(blends_in_half(options)),
       blend_threads_(
           std::max(records_ ? kBlocks * blend_subgroup(device) : device.tuning().blend_threads,
                    blend_subgroup(device))) {
+    if (half_) half_blend_lanes(device);  // throws where there are none
     if (options.store_for_backward && options.depth_order == DEPTH_ORDER_PIXEL)
         throw Error("frame", "a resorted pixel cannot be walked back",
                     "Use another depth order, or do not store for a backward pass.");
@@ -138,15 +167,21 @@ Pipeline& Forward::blend_pipeline(const Frame& frame) {
     SpecConstants blend = kernel_constants(*device_, options_);
     blend["MIN_TRANSMITTANCE"] = least_transmittance(options_.transmittance_stop);
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
-    const std::uint32_t subgroup = add_block_constants(*device_, blend);
-    blend["THREADS"] = static_cast<std::int32_t>(blend_threads_);
-    blend["PIXELS"] = static_cast<std::int32_t>(TILE_SIZE * TILE_SIZE / blend_threads_);
+    std::uint32_t subgroup = add_block_constants(*device_, blend);
+    if (half_) {
+        subgroup = half_blend_lanes(*device_);
+        blend["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
+        blend["EVALUATION"] = EVALUATION_BUILTIN;
+    }
+    const std::uint32_t threads = half_ ? kBlocks * subgroup : blend_threads_;
+    blend["THREADS"] = static_cast<std::int32_t>(threads);
+    blend["PIXELS"] = static_cast<std::int32_t>(TILE_SIZE * TILE_SIZE / threads);
     blend["CHECKPOINTS"] = frame.size.bucket > 0 ? 1 : 0;
     if (frame.size.bucket > 0) blend["BUCKET"] = static_cast<std::int32_t>(frame.size.bucket);
     blend["LONGEST_FIRST"] = longest_first_ ? 1 : 0;
     blend["SEGMENT"] = parts ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
-    pipeline = Pipeline(*device_, blends_records(frame) ? "blend_records" : "blend", blend, true,
-                        subgroup);
+    const char* shader = half_ ? "blend_half" : blends_records(frame) ? "blend_records" : "blend";
+    pipeline = Pipeline(*device_, shader, blend, true, subgroup);
     return pipeline;
 }
 

@@ -69,6 +69,7 @@ class Forward {
     ForwardOptions options_;
     // By the device's tuning, like the next.
     bool short_depths_, emits_slots_, longest_first_, records_;
+    bool half_;                                        // blends in half precision
     std::uint32_t blend_threads_;                      // threads of a tile's workgroup
     std::map<std::pair<int, int>, Pipeline> project_;  // by SH degree in use and in the buffers
     Pipeline compact_, gather_counts_, groups_visible_, groups_intersections_, emit_, tile_ranges_,

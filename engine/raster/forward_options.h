@@ -74,6 +74,7 @@ struct ForwardOptions {
     int storage = STORAGE_FLOAT32;         // how projected splats are stored
     int depth_order = DEPTH_ORDER_CENTRE;  // DEPTH_ORDER_PIXEL: forward only
     int projection = PROJECTION_JACOBIAN;  // PROJECTION_*
+    int arithmetic = ARITHMETIC_FLOAT32;   // of the blends, ARITHMETIC_*
     ProjectionEffects effects;
     bool store_for_backward = false;
     bool backward_follows = true;  // false: what is stored is looked at, without a backward pass
@@ -108,6 +109,14 @@ constexpr std::uint32_t image_planes(const ForwardOptions& options) {
 bool is_exponential(int kernel);
 /// EVALUATION_* of these options on a device.
 int evaluation_on(const Device& device, const ForwardOptions& options);
+/// Whether a kernel has a form in half precision: those with w = exp(-q/2) and no other term.
+bool has_half_blend(int kernel);
+/// Whether the two blends of these options run in half precision. Kernels without that form keep
+/// float32, as do pixels that are resorted.
+bool blends_in_half(const ForwardOptions& options);
+/// Lanes of the subgroups of blends in half precision. Throws Error where the device cannot run
+/// them.
+std::uint32_t half_blend_lanes(const Device& device);
 /// The constants of these options that several passes share: kernel, storage and depth order.
 SpecConstants kernel_constants(const Device& device, const ForwardOptions& options);
 /// Those of the projection, forward and back: the kernel's, the effects', the degree in use and

@@ -177,7 +177,7 @@ std::uint32_t FrameBuffers::max_intersections(const Device& device, BackwardBlen
 
 std::uint32_t FrameBuffers::bucket(const Device& device, const ForwardOptions& options) {
     const bool buckets = device.tuning().backward == BackwardBlend::buckets;
-    return walks_back(options) && buckets ? bucket_length(device) : 0;
+    return walks_back(options) && buckets && !blends_in_half(options) ? bucket_length(device) : 0;
 }
 
 // A size is taken note of once its buffers are there: where one cannot be had, the next call makes

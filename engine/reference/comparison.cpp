@@ -12,6 +12,8 @@
 namespace darb::reference {
 namespace {
 
+constexpr double kHalfRoundoff = 1.0 / 2048;  // of half precision, round to nearest
+
 constexpr Tolerance kTable[] = {
     {"exact", 0, 0, 0, -1, 0, "counts, indices, order, and paths that must agree to the bit"},
     {"difference", 2e-7, 2e-7, 0, 1 - 1e-12, 1e-6,
@@ -57,6 +59,11 @@ constexpr Tolerance kTable[] = {
     {"gradient_scaled_half", 2e-3, 1e-2, 0.01, 1 - 1e-4, 1e-2,
      "for compare_scaled; as image_half, and the device takes the sums of q's factor by moments of "
      "the rounded factor, which is 2^-11 of them"},
+    {"image_fast16", 10 * kHalfRoundoff, 0, 0.01, 1 - 1e-5, 2e-3,
+     "alpha in halves: weighted over a splat's pixels it is off by 10 u of itself, u = 2^-11, if "
+     "all roundings add up (docs/math.md); the band is the cut-off, as for image_float32"},
+    {"gradient_scaled_fast16", 40 * kHalfRoundoff, 20 * kHalfRoundoff, 0.01, 1 - 1e-4, 1e-2,
+     "for compare_scaled; as image_fast16, forward and back, and the sums over pixels cancel"},
     {"image_resorted", 2e-5, 2e-5, 0.01, 1 - 1e-4, 1e-2,
      "as image_float32; the slope of the depth is stored as two halves, so that two splats cross "
      "up to a pixel off"},

@@ -9,6 +9,11 @@
 #define STORAGE_FLOAT32 0
 #define STORAGE_FLOAT16 1
 
+// The arithmetic of the two blends. With fast16 two pixels of a thread form a pair whose exponent
+// and opacity are computed in half precision; transmittance and all sums stay float32.
+#define ARITHMETIC_FLOAT32 0
+#define ARITHMETIC_FAST16 1
+
 // The order of the splats: by the depth of their centres, as 32-bit floats or as 16-bit keys; or
 // that order corrected for each pixel by a window that is sorted by the splat's depth at the pixel.
 #define DEPTH_ORDER_CENTRE 0

@@ -84,6 +84,7 @@ TEST_P(EveryChoice, matches_the_double_reference_at_the_same_settings) {
     settings.projection = o.projection;
     settings.alpha_cutoff = o.alpha_cutoff;
     settings.transmittance_stop = o.transmittance_stop;
+    settings.arithmetic = o.arithmetic;
     Image<double> weights;
     if (o.depth_order != DEPTH_ORDER_PIXEL) {
         Pcg32 random(3);
@@ -96,6 +97,7 @@ TEST_P(EveryChoice, matches_the_double_reference_at_the_same_settings) {
     const bool half = o.storage == STORAGE_FLOAT16;
     const char* image = half ? "image_half" : "image_float32";
     if (o.depth_order == DEPTH_ORDER_PIXEL) image = "image_resorted";
+    if (o.arithmetic == ARITHMETIC_FAST16) image = "image_fast16";
     EXPECT_TRUE(compare("image", truth.images.colour.data, walk.image.data, tolerance(image), 3));
     if (weights.data.empty()) return;
 
@@ -106,7 +108,9 @@ TEST_P(EveryChoice, matches_the_double_reference_at_the_same_settings) {
         if (expected.empty()) continue;
         EXPECT_TRUE(
             compare_scaled(std::string("d_") + attribute_name(a), expected, walk.d[a],
-                           tolerance(half ? "gradient_scaled_half" : "gradient_scaled_float32")));
+                           tolerance(o.arithmetic == ARITHMETIC_FAST16 ? "gradient_scaled_fast16"
+                                     : half                            ? "gradient_scaled_half"
+                                            : "gradient_scaled_float32")));
     }
 }
 
@@ -134,6 +138,7 @@ bool is_same(int kernel, int setting, const AccuracyChoice& choice) {
         };
         return degree(static_cast<int>(choice.value)) == degree(kFullDegree);
     }
+    if (setting == kArithmetic) return !has_half_blend(kernel);
     return setting == kShDegree && choice.value == 3;
 }
 

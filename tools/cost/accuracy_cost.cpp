@@ -226,6 +226,9 @@ std::vector<CostRow> single_rows(const Device& device, const SplatModel& model) 
             if (s == kEvaluation && !changes_evaluation(device, row.accuracy, model.kernel))
                 continue;
             if (s == kFootprint && !has_exact_footprint(model.kernel)) continue;
+            if (s == kArithmetic &&
+                !(device.info().half_arithmetic && has_half_blend(model.kernel)))
+                continue;
             rows.push_back(std::move(row));
         }
     for (const int preset : {int(kFast), int(kExact)}) {

@@ -104,6 +104,9 @@ std::vector<TrainCostRow> training_rows(const Device& device, const Schedule& sc
             if (s == kFootprint && (row.accuracy.value(s) == FOOTPRINT_PSI ||  // the default
                                     !has_exact_footprint(options.kernel)))
                 continue;
+            if (s == kArithmetic &&
+                !(device.info().half_arithmetic && has_half_blend(options.kernel)))
+                continue;
             rows.push_back(row);
         }
     }
@@ -204,6 +207,7 @@ class GradientErrors {
         walk.storage = frame.options.storage;
         walk.depth_order = frame.options.depth_order;
         walk.projection = frame.options.projection;
+        walk.arithmetic = frame.options.arithmetic;
         walk.alpha_cutoff = frame.options.alpha_cutoff;
         walk.transmittance_stop = frame.options.transmittance_stop;
         std::vector<double> errors;

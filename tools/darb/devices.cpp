@@ -48,6 +48,7 @@ void print_device(std::FILE* out, const DeviceInfo& info, bool chosen) {
     row("workgroup", fmt::format("{} threads, {} KiB shared memory", info.max_workgroup_threads,
                                  info.shared_memory_bytes / 1024));
     row("float atomics", info.float_atomics ? "yes" : "no");
+    row("half arithmetic", info.half_arithmetic ? "yes" : "no");
     row("timestamps",
         info.timestamp_period_ns > 0 ? fmt::format("every {} ns", info.timestamp_period_ns) : "no");
     if (info.usable) row("passes", tuning_of_listed(info));

@@ -48,6 +48,11 @@ void note_unused_choices(const AccuracyFlags& flags, int kernel) {
     if (flags.choice[kEvaluation] == "builtin" && !has_builtin_evaluation(kernel))
         say_note(fmt::format("note: --evaluation builtin is not used: {} has polynomials only",
                              kernel_name(kernel)));
+    if (flags.choice[kArithmetic] == "fast16" && !has_half_blend(kernel))
+        say_note(
+            fmt::format("note: --arithmetic fast16 is not used: {} has no form in half "
+                        "precision, only gaussian and ges_published have",
+                        kernel_name(kernel)));
 }
 
 void add_effects_flag(CLI::App& command, std::string& text) {

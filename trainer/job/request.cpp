@@ -193,6 +193,13 @@ std::vector<std::string> unused_options(const TrainRequest& r) {
         !has_builtin_evaluation(kernel))
         notes.push_back(fmt::format("--evaluation builtin is not used: {} has polynomials only",
                                     kernel_name(kernel)));
+    if (r.train.accuracy.of(kArithmetic).name == "fast16" &&
+        (!has_half_blend(kernel) || r.train.learn_kernel > 0))
+        notes.push_back(fmt::format(
+            "--arithmetic fast16 is not used{}: {} has no form in half precision, only gaussian "
+            "and ges_published have",
+            r.train.learn_kernel > 0 ? " once the kernel is learned" : "",
+            r.train.learn_kernel > 0 ? "a learned kernel" : kernel_name(kernel)));
     if (was_given(r, "--evaluation") && r.train.accuracy.of(kEvaluation).name == "builtin" &&
         has_builtin_evaluation(kernel) && r.train.learn_kernel > 0)
         notes.push_back("--evaluation builtin is not used: a learned kernel has polynomials only");

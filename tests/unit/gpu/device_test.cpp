@@ -428,6 +428,16 @@ TEST(ShaderFeatures, a_device_is_asked_for_what_the_shaders_use_and_no_more) {
         << "int64, float64 and float atomics are not asked for";
 }
 
+// A device without it is asked for all the rest.
+TEST(ShaderFeatures, half_precision_is_used_by_its_two_blends_alone) {
+    std::vector<std::string> names;
+    for (const ShaderBinary& shader : shader_table())
+        for (const ShaderNeed& need : shader_needs({&shader, 1}))
+            if (need.capability == 9) names.emplace_back(shader.name);
+    EXPECT_EQ(names, (std::vector<std::string>{"blend_backward_half", "blend_half"}));
+    EXPECT_TRUE(parse_faults("no_half").no_half);
+}
+
 TEST(ShaderFeatures, a_refusal_names_the_feature_and_who_needs_it) {
     const auto plain = module_with({1}), wide = module_with({1, 11, 4433}),
                votes = module_with({62});
