@@ -128,6 +128,29 @@ void compile_frames(Device& device) {
     const Upsample upsample(device);
 }
 
+// The blends of fast16, where the device can have them.
+void compile_half(Device& device) {
+    if (!device.info().half_arithmetic ||
+        lanes_by_pixels(device.info(), blend_subgroup(device)) == 0)
+        return;
+    const Camera camera = bench_camera(glm::dvec3(0, 0, 4), true, kSide, kSide);
+    ForwardOptions options;
+    options.store_for_backward = true;
+    options.arithmetic = ARITHMETIC_FAST16;
+    FrameBuffers buffers(device, options);
+    Forward forward(device, options);
+    const BlendBackward backward(device, options);
+    const SplatModel model = random_scene(64, kDegree);
+    GpuSplats splats(device, model, false);
+    const Buffer cameras = upload_cameras(device, {camera_data(camera, model.origin)});
+    const FrameView view{camera_data(camera, model.origin), &cameras, 0, kDegree, glm::vec3(0)};
+    buffers.reserve(splats.count(), splats.count() * 4, kSide, kSide);
+    Commands commands(device);
+    commands.begin();
+    forward.record(commands, splats, view, buffers.frame());
+    commands.submit_and_wait();
+}
+
 void compile_training(Device& device) {
     const Schedule schedule;
     for (const Strategy strategy : all_strategies())
@@ -188,6 +211,7 @@ PassStatistics compile_every_pass(const std::string& select) {
         }
     device.set_tuning(usual);
     compile_frames(device);
+    compile_half(device);
     compile_training(device);
     std::set<std::string> seen;
     for (const CompiledPipeline& one : device.compiled())
