@@ -8,8 +8,10 @@
 #include <algorithm>
 #include <set>
 
+#include "engine/gpu/faults.h"
 #include "tests/support/chromium.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_device_options.h"
 #include "tests/support/test_scene.h"
 #include "tools/cost/cost_report.h"
 #include "tools/cost/train_cost.h"
@@ -147,7 +149,8 @@ TEST(Cost, small_scene_is_measured_whole) {
             EXPECT_GT(r.error.psnr_db, 85) << "float32 at the truth's own settings";
         }
     }
-    EXPECT_EQ(changed.size(), size_t{kAccuracyCount}) << "a setting changes no picture";
+    EXPECT_FALSE(changed.contains(kArithmetic)) << "this kernel has no form in half precision";
+    EXPECT_EQ(changed.size(), size_t{kAccuracyCount - 1}) << "a setting changes no picture";
     const std::string usual = shared_device().tuning().exp_builtin ? "builtin" : "polynomial";
     EXPECT_TRUE(std::ranges::none_of(result.rows, [&](const CostRow& r) {
         return r.name == "evaluation " + usual;
@@ -157,6 +160,23 @@ TEST(Cost, small_scene_is_measured_whole) {
     EXPECT_EQ(json["rows"].size(), result.rows.size());
     EXPECT_EQ(json["rows"][0]["accuracy"]["alpha_cutoff"], "1/255");
     expect_all_drawn(cost_report(result, "a <scene>").page(), 3);
+}
+
+TEST(Cost, half_precision_has_a_row_where_kernel_and_device_have_it) {
+    const auto has_row = [](const Device& device, int kernel) {
+        Schedule schedule;
+        schedule.options.kernel = kernel;
+        return std::ranges::any_of(training_rows(device, schedule), [](const TrainCostRow& row) {
+            return row.name == "arithmetic fast16";
+        });
+    };
+    DeviceOptions without = device_options();
+    without.faults = parse_faults("no_half");
+    const Device plain(without);
+    const bool half = shared_device().info().half_arithmetic;
+    EXPECT_EQ(has_row(shared_device(), KERNEL_GAUSSIAN), half);
+    EXPECT_FALSE(has_row(shared_device(), KERNEL_RAISED_COSINE));
+    EXPECT_FALSE(has_row(plain, KERNEL_GAUSSIAN));
 }
 
 // Every setting changes some picture of the scene that ships with the sources.
@@ -182,7 +202,7 @@ TEST(Cost, every_setting_changes_the_shipped_scene) {
         EXPECT_GT(*r.photo_psnr_db, 5) << r.name;
     }
     for (int s = 0; s < kAccuracyCount; ++s)
-        EXPECT_TRUE(changed.contains(s)) << accuracy_settings()[s].name;
+        EXPECT_TRUE(changed.contains(s) || s == kArithmetic) << accuracy_settings()[s].name;
 }
 
 TEST(TrainCost, prices_every_setting_of_training_long) {
