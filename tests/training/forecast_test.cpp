@@ -55,6 +55,33 @@ TEST(PredictSplats, is_bounded_by_pixels_start_and_limit) {
     EXPECT_EQ(predicted(options, {4'000, kManyPixels, {}, 5'000}), 5'000U);
 }
 
+// Splats outside do not grow in number: with half of the start inside, half of the growth is left.
+TEST(PredictSplats, only_the_region_grows) {
+    const Dataset scene = small_scene();
+    TrainOptions options;
+    Device device(test_device_options());
+    const auto wanted = [&] {
+        return wanted_splats(device, scene, options, kManyPixels, initial_count(scene, options));
+    };
+    const std::uint32_t start = initial_count(scene, options), whole = wanted();
+    ASSERT_GT(whole, start);
+    const std::uint32_t budget = default_budget(scene, options);
+    const SplatModel points = initial_model(scene, options);
+    std::vector<double> x;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        x.push_back(double{points.position[3 * i]} + points.origin.x);
+    std::ranges::nth_element(x, x.begin() + std::ptrdiff_t(x.size() / 2));
+    Region half;
+    half.centre.x = x[x.size() / 2] - 1e3;
+    half.half_size = glm::dvec3(1e3, 1e6, 1e6);
+    options.region = half;
+    EXPECT_NEAR(wanted(), start + (whole - start) / 2, 0.01 * whole);
+    EXPECT_LT(default_budget(scene, options), budget);
+    half.centre.x += 1e7;
+    options.region = half;
+    EXPECT_EQ(wanted(), start);
+}
+
 TEST(PredictSplats, few_rounds_grow_less) {
     TrainOptions options;
     options.speed_up_short_runs = false;

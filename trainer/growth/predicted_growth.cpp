@@ -2,9 +2,12 @@
 #include "trainer/growth/predicted_growth.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/raster/gpu_splats.h"
+#include "engine/scene/region.h"
 #include "trainer/growth/initial_model.h"
+#include "trainer/options/strategy.h"
 
 namespace darb {
 
@@ -52,6 +55,26 @@ GrowthStart growth_start(const Dataset& dataset, const TrainOptions& options,
             .scene_pixels = scene_pixels(dataset)};
 }
 
+// Of what a run starts with, the share inside options.region, where alone splats grow in number.
+// Random splats, which fill all that photos see, count like their places.
+double share_in_region(const Dataset& dataset, const TrainOptions& options) {
+    if (!options.region) return 1;
+    const SplatModel start = initial_model(dataset, options);
+    std::size_t inside = 0;
+    for (const std::uint8_t outside : splats_outside(*options.region, start))
+        inside += outside == 0;
+    return start.size() == 0 ? 1 : double(inside) / double(start.size());
+}
+
+// Where `whole` splats are forecast of a scene that grows everywhere: what is inside the region
+// grows as it would there, and the rest of the start stays as it is.
+std::uint32_t grown_in_region(const Dataset& dataset, const TrainOptions& options,
+                              std::uint32_t start, std::uint32_t whole) {
+    if (!options.region || whole <= start) return whole;
+    const double grown = share_in_region(dataset, options) * (double(whole) - double(start));
+    return start + static_cast<std::uint32_t>(std::lround(grown));
+}
+
 std::uint64_t training_pixels(const Dataset& dataset) {
     std::uint64_t pixels = 0;
     for (const View& view : dataset.views)
@@ -81,7 +104,12 @@ std::uint32_t wanted_splats(const Device& device, const Dataset& dataset, const 
     const TrainOptions& options = schedule.options;
     const std::uint32_t limit = std::min(options.max_splats.value_or(kAnyNumberOfSplats),
                                          GpuSplats::max_count(device, options.sh_degree, true));
-    return predict_splats(schedule, growth_start(dataset, options, photo_pixels, start, limit));
+    const auto predicted = [&](std::uint32_t most) {
+        return predict_splats(schedule, growth_start(dataset, options, photo_pixels, start, most));
+    };
+    // A strategy with a budget uses all of it inside the region.
+    if (!options.region || strategy_row(options.strategy).grows_to_limit) return predicted(limit);
+    return std::min(limit, grown_in_region(dataset, options, start, predicted(kAnyNumberOfSplats)));
 }
 
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
@@ -93,7 +121,7 @@ std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options
         growth_start(dataset, usual, training_pixels(dataset), initial_count(dataset, usual),
                      options.max_splats.value_or(kAnyNumberOfSplats));
     start.dense = false;  // nor are they counted here
-    return predict_splats(usual, start);
+    return grown_in_region(dataset, usual, start.splats, predict_splats(usual, start));
 }
 
 double mean_splats(std::uint32_t start, std::uint32_t end, const Schedule& schedule) {

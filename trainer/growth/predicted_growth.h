@@ -22,12 +22,13 @@ double mean_photo_pixels(const Dataset& dataset);
 std::uint32_t predict_splats(const Schedule& schedule, const GrowthStart& start);
 
 /// The same for a data set on a device, whatever its memory says: within options.max_splats and
-/// what the device's buffers hold. photo_pixels: of all training photos together.
+/// what the device's buffers hold. With options.region only the share of the start that lies inside
+/// grows. photo_pixels: of all training photos together.
 std::uint32_t wanted_splats(const Device& device, const Dataset& dataset, const Schedule& schedule,
                             std::uint64_t photo_pixels, std::uint32_t start);
 
 /// The count that a strategy grows to where no --max-splats is given: what adc would be forecast to
-/// end with from its points, or from random ones where there are none.
+/// end with from its points, or from random ones where there are none; with options.region, there.
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options);
 
 /// Mean count over the run; adc: where it grows evenly while density control runs.
