@@ -282,10 +282,6 @@ void add_notes(const Tally& tally, const DatasetOptions& options, Dataset& datas
 
 }  // namespace
 
-std::string counted(std::size_t count, const char* noun) {
-    return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
-}
-
 PhotoSize size_at_resolution(int width, int height, int resolution) {
     const auto at_width = [&](int target) {  // truncates as 3DGS does
         const double scale = static_cast<double>(width) / target;

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/core/count_text.h"
 #include "engine/data/dataset.h"
 
 namespace darb {
@@ -94,8 +95,5 @@ std::string without_images(const std::string& name);
 
 /// The first folder in `folder` named images_2 or the like; empty where there is none.
 std::string scaled_images(const std::filesystem::path& folder);
-
-/// A count with its noun, for notes: "1 photo", "3 photos".
-std::string counted(std::size_t count, const char* noun);
 
 }  // namespace darb

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/text.h"
 #include "engine/data/camera_list.h"
@@ -219,9 +220,9 @@ std::string web_page_text(const WebPageFacts& facts) {
         facts.exact ? std::string("float32 values")
                     : fmt::format("values rounded at level {} of {}", facts.level, kPageLevels - 1);
     const std::string merged =
-        facts.merged_from > 0 ? fmt::format(" merged from {}", facts.merged_from) : "";
-    return fmt::format("{} splats{}, {} bytes, {}: {}", facts.splats, merged, facts.bytes, splats,
-                       loss_text(facts.loss));
+        facts.merged_from > 0 ? " merged from " + count_text(facts.merged_from) : "";
+    return fmt::format("{} splats{}, {} bytes, {}: {}", count_text(facts.splats), merged,
+                       count_text(facts.bytes), splats, loss_text(facts.loss));
 }
 
 }  // namespace darb

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "engine/core/count_text.h"
 #include "engine/report/palette.h"
 
 namespace darb {
@@ -54,15 +55,7 @@ std::string base64(std::span<const std::byte> bytes) {
 
 std::string format_number(double v, int decimals) {
     if (!std::isfinite(v)) return "-";
-    const std::string plain = fmt::format("{:.{}f}", v, decimals);
-    const std::size_t first = plain[0] == '-' ? 1 : 0;
-    const std::size_t point = std::min(plain.find('.'), plain.size());
-    std::string text;
-    for (std::size_t i = 0; i < plain.size(); ++i) {
-        if (i > first && i < point && (point - i) % 3 == 0) text += ',';
-        text += plain[i];
-    }
-    return text;
+    return with_thousands(fmt::format("{:.{}f}", v, decimals));
 }
 
 namespace {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/scene/edit_text.h"
 
@@ -38,7 +39,7 @@ void raise_sh_degree(int degree, SplatModel& model) {
 }  // namespace
 
 std::string counted_splats(const char* verb, std::size_t count) {
-    return fmt::format("{} {} splat{}", verb, count, count == 1 ? "" : "s");
+    return fmt::format("{} {}", verb, counted(count, "splat"));
 }
 
 LayerLook look_of(const SplatModel& model) {

@@ -316,7 +316,7 @@ TEST(Command, train_begins_with_a_forecast) {
     const Outcome o = darb(
         fmt::format("train {} -o {} -r 4 --iterations 1", kScene, (scratch() / "one").string()));
     EXPECT_EQ(o.code, 0) << o.err;
-    EXPECT_NE(o.err.find("forecast: 1 iterations, 4000 splats at the end; "), std::string::npos)
+    EXPECT_NE(o.err.find("forecast: 1 iterations, 4,000 splats at the end; "), std::string::npos)
         << o.err;
     EXPECT_NE(o.err.find("of device memory"), std::string::npos) << o.err;
 }

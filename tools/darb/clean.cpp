@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
@@ -250,7 +251,8 @@ int clean(CleanFlags flags) {
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
     tell_report(out, clutter, judged);
     if (!flags.dry_run)
-        tell(out, "{}: {} of {} splats\n", flags.output.string(), kept.size(), model.size());
+        tell(out, "{}: {} of {} splats\n", flags.output.string(), count_text(kept.size()),
+             count_text(model.size()));
     tell_paths(flags.quiet, {flags.output, flags.json, flags.paper});
     return 0;
 }

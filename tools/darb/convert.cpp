@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/parse_number.h"
 #include "engine/core/say.h"
@@ -412,8 +413,9 @@ int convert_to_scene(SplatModel& model, SplatFormat format, const ConvertFlags& 
     const WrittenScene written = write_scene(flags.output, model, flags.choices, writer);
     const PictureFit& fit = written.fit;
     tell(say, "{}: {}, {} splats{}, {} bytes{}\n", flags.output.string(), format_name(format),
-         written.splats, fit.merged_from > 0 ? fmt::format(" merged from {}", fit.merged_from) : "",
-         written.encoded.bytes(),
+         count_text(written.splats),
+         fit.merged_from > 0 ? " merged from " + count_text(fit.merged_from) : "",
+         count_text(written.encoded.bytes()),
          written.levels > 1
              ? fmt::format(", harmonics rounded at level {} of {}", fit.level, written.levels - 1)
              : "");
@@ -516,7 +518,7 @@ void report_dropped(std::FILE* say, const std::string& option, size_t count, siz
     if (count > 0 && left == 0)
         throw Error(option, fmt::format("keeps none of {} splats", count),
                     "`darb info` prints where the splats are and how opaque.");
-    if (count > 0) tell(say, "{}: {} splats left out\n", option, count);
+    if (count > 0) tell(say, "{}: {} splats left out\n", option, count_text(count));
 }
 
 }  // namespace

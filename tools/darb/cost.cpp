@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
@@ -102,7 +103,7 @@ int cost(const CostFlags& flags) {
     write_paper(flags.paper, cost_report(result, name_in_json(flags.paper, flags.scene)),
                 together({files_of(flags.scene), files_of(flags.dataset)}));
     tell(stream_beside_json(flags.json, flags.quiet), "{}: {} splats, {}; {} views of {}\n\n{}",
-         flags.scene, model.size(), result.device, views.cameras.size(),
+         flags.scene, count_text(model.size()), result.device, views.cameras.size(),
          flags.dataset.empty() ? "an orbit" : flags.dataset, cost_table(result));
     tell_paths(flags.quiet, {flags.json, flags.html, flags.paper});
     return 0;

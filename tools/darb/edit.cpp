@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/scene/edit.h"
@@ -129,7 +130,7 @@ int edit_as_asked(const EditFlags& flags) {
         written.wrote({flags.record});
     }
     tell(flags.quiet ? nullptr : stdout, "{}: {} splats, {} before\n", flags.output.string(),
-         model.size(), before);
+         count_text(model.size()), count_text(before));
     tell_paths(flags.quiet, {flags.output, flags.record});
     return 0;
 }

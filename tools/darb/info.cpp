@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/count_text.h"
 #include "engine/core/files.h"
 #include "engine/core/quantile.h"
 #include "engine/core/say.h"
@@ -149,7 +150,7 @@ void print_scene_info(const json& info) {
             (info["version"].is_null() ? ""
                                        : fmt::format(" version {}", info["version"].get<int>())) +
             (details.empty() ? "" : " (" + details + ")"));
-    row("splats", fmt::format("{}", info["splats"].get<size_t>()));
+    row("splats", count_text(info["splats"].get<size_t>()));
     row("kernel",
         fmt::format("{}, footprint {}, render mode {}", info["kernel"].get<std::string>(),
                     info["footprint"].get<std::string>(), info["render_mode"].get<std::string>()));

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
@@ -335,8 +336,8 @@ std::string report_text(const MeshFlags& flags, const SceneMesh& result, double 
     if (r.texture && r.texture->seam_levels)
         text += fmt::format("seams: photos differ by {:.1f} of 255 levels there, levelled {:.1f}\n",
                             (*r.texture->seam_levels)[0], (*r.texture->seam_levels)[1]);
-    return text + fmt::format("{} vertices, {} faces\n", result.mesh.vertex_count(),
-                              result.mesh.face_count());
+    return text + fmt::format("{} vertices, {} faces\n", count_text(result.mesh.vertex_count()),
+                              count_text(result.mesh.face_count()));
 }
 
 // The work.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "engine/core/count_text.h"
 #include "engine/core/say.h"
 #include "engine/data/run_colmap.h"
 #include "engine/gpu/device.h"
@@ -40,20 +41,20 @@ std::optional<int> smaller_resolution(const std::vector<View>& views) {
 std::string about(std::uint32_t count) {
     std::uint32_t unit = 1;
     while (count / unit >= 100) unit *= 10;
-    return fmt::format("about {}", std::uint64_t{(count + unit / 2) / unit} * unit);
+    return "about " + count_text(std::uint64_t{(count + unit / 2) / unit} * unit);
 }
 
 std::string time_text(const Forecast& f, const TrainOptions& options) {
     const int iterations = options.iterations;
     const bool changes = f.splats != f.start_splats;
-    const std::string end = changes ? about(f.splats) : std::to_string(f.splats);
+    const std::string end = changes ? about(f.splats) : count_text(f.splats);
     if (f.seconds <= 0)
         return fmt::format(
-            "{} iterations{}, {} splats at the end", iterations,
+            "{} iterations{}, {} splats at the end", count_text(iterations),
             f.start_ms > 0 ? fmt::format(", {:.1f} ms each at first", f.start_ms) : "", end);
-    std::string text =
-        fmt::format("about {} for {} iterations, {:.1f} ms each at {} splats",
-                    format_duration(f.seconds), iterations, f.start_ms, f.start_splats);
+    std::string text = fmt::format("about {} for {} iterations, {:.1f} ms each at {} splats",
+                                   format_duration(f.seconds), count_text(iterations), f.start_ms,
+                                   count_text(f.start_splats));
     for (std::size_t step = 0; step < f.ramp_ms.size(); ++step)
         text += fmt::format("{}{:.1f}", step == 0 ? " (with smaller photos at first " : ", ",
                             f.ramp_ms[step]);
@@ -180,7 +181,8 @@ void print_growth(const Schedule& schedule) {
 void print_scene(const Device& device, const TrainJob& job, std::size_t held_out) {
     const Dataset& dataset = job.dataset;
     say("{}: {}, {} photos to train on, {} held out, {} points\n", dataset.root.string(),
-        dataset.source, dataset.views.size() - held_out, held_out, dataset.points.size());
+        dataset.source, count_text(dataset.views.size() - held_out), count_text(held_out),
+        count_text(dataset.points.size()));
     say_notes(dataset.notes);
     say("device: {}\n", device.description());
     say("effects: {}\n", plan_line(job.effects));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "trainer/job/job.h"
 
+#include "engine/core/count_text.h"
 #include "engine/plan/tuner.h"
 
 #include <fmt/format.h>
@@ -103,11 +104,13 @@ void plan_region(TrainJob& job) {
     const std::size_t inside =
         points.size() - count_of(splats_outside(*job.options.region, points));
     if (inside == 0)
-        throw Error("--roi " + job.request.region,
-                    fmt::format("none of the data set's {} points lies in it", points.size()),
-                    "Name a region around what the photos show, in the data set's coordinates; "
-                    "--roi subject finds one.");
-    job.region_note += fmt::format(", with {} of {} points", inside, points.size());
+        throw Error(
+            "--roi " + job.request.region,
+            fmt::format("none of the data set's {} points lies in it", count_text(points.size())),
+            "Name a region around what the photos show, in the data set's coordinates; "
+            "--roi subject finds one.");
+    job.region_note +=
+        fmt::format(", with {} of {} points", count_text(inside), count_text(points.size()));
 }
 
 CleaningRules cleaning_of(const TrainJob& job) {
@@ -126,12 +129,12 @@ void plan_strategy(TrainJob& job) {
     if (!strategy_row(t.strategy).grows_to_limit) return;
     const bool given = t.max_splats.has_value();
     if (!given) t.max_splats = default_budget(job.dataset, t);
-    job.strategy_note =
-        fmt::format("strategy: {}, up to {} splats{}", strategy_name(t.strategy), *t.max_splats,
-                    given ? ""
-                          : fmt::format(", what {} is forecast to end with; --budget sets another "
-                                        "count",
-                                        strategy_name(Strategy{})));
+    job.strategy_note = fmt::format(
+        "strategy: {}, up to {} splats{}", strategy_name(t.strategy), count_text(*t.max_splats),
+        given ? ""
+              : fmt::format(", what {} is forecast to end with; --budget sets another "
+                            "count",
+                            strategy_name(Strategy{})));
 }
 
 }  // namespace
@@ -186,8 +189,8 @@ void find_start(Device& device, TrainJob& job, const std::function<void()>& begi
     job.start_note = fmt::format(
         "start: dense, {} points on surfaces and {} of the data set, in {:.1f} s; "
         "photos agree on {:.0f} % of their pixels",
-        start.on_surfaces, start.cloud.size() - start.on_surfaces, start.seconds,
-        100 * start.agreeing);
+        count_text(start.on_surfaces), count_text(start.cloud.size() - start.on_surfaces),
+        start.seconds, 100 * start.agreeing);
     dataset.start = start.cloud;
     job.start = std::move(start);
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "engine/core/count_text.h"
 #include "engine/core/say.h"
 #include "engine/core/system.h"
 #include "trainer/options/schedule.h"
@@ -276,7 +277,7 @@ std::string Progress::text(const IterationResult& r, const Device& device) const
     }
     return fmt::format(
         "{}{}/{}  {:.1f} it/s  {:.1f} ms  loss {:.4f}  PSNR {:.2f} dB  {} splats  {}  {} left", bar,
-        r.iteration, last_, rate, 1000.0 / rate, loss_, psnr_db_, r.splats,
+        r.iteration, last_, rate, 1000.0 / rate, loss_, psnr_db_, count_text(r.splats),
         format_bytes(static_cast<double>(device.allocated_bytes())), format_duration(left));
 }
 

@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/memory.h"
@@ -236,10 +237,11 @@ void Run::evaluate(int iteration) {
     for (size_t v = 0; v < files.size(); ++v)
         summary_.pictures.push_back({evaluation.views[v].name, files[v],
                                      evaluation.views[v].psnr_db, evaluation.views[v].ssim});
-    progress_.note(fmt::format(
-        "iteration {}: held-out PSNR {:.2f} dB, SSIM {:.4f} over {} views, {} splats", iteration,
-        evaluation.psnr_db, evaluation.ssim,
-        evaluation.views.size() - (evaluation.arc ? evaluation.arc->views : 0), evaluation.splats));
+    progress_.note(
+        fmt::format("iteration {}: held-out PSNR {:.2f} dB, SSIM {:.4f} over {} views, {} splats",
+                    iteration, evaluation.psnr_db, evaluation.ssim,
+                    evaluation.views.size() - (evaluation.arc ? evaluation.arc->views : 0),
+                    count_text(evaluation.splats)));
     if (const auto& arc = evaluation.arc)
         progress_.note(fmt::format("the arc: PSNR {:.2f} dB, SSIM {:.4f} over {} views",
                                    arc->psnr_db, arc->ssim, arc->views));
@@ -265,7 +267,7 @@ void Run::save_model(int iteration) {
     if (summary_.undrawn > 0)
         progress_.note(
             fmt::format("{} of {} splats are too transparent to be drawn and are left out of {}",
-                        summary_.undrawn, all, summary_.model.string()));
+                        count_text(summary_.undrawn), count_text(all), summary_.model.string()));
     if (model.size() == 0)
         progress_.warn("no splat is left: " + summary_.model.string() + " is empty");
     while_doing(summary_.model.string(), [&] { write_ply(summary_.model, model); });
@@ -299,8 +301,8 @@ void Run::clean(int iteration, SplatModel& model) {
 void Run::leave_out(int iteration, const Clutter& clutter, SplatModel& model) {
     const auto tell = [&](const ClutterOfRule& rule) {
         progress_.note(fmt::format("cleaning, {}: {} of {} splats, {:.2f} % of the light",
-                                   rule.rule, count_of(rule.set), rule.set.size(),
-                                   100 * rule.light));
+                                   rule.rule, count_text(count_of(rule.set)),
+                                   count_text(rule.set.size()), 100 * rule.light));
     };
     for (const ClutterOfRule& rule : clutter.rules) tell(rule);
     if (clutter.rules.size() > 1) tell(clutter.together);
@@ -637,7 +639,9 @@ void Run::report_memory() {
     const auto tell = [&](std::uint32_t splats, std::uint32_t& told, const char* limit,
                           const std::string& reason) {
         if (splats == told) return;
-        if (told == 0) progress_.note(fmt::format("growth stops at {} splats: {}", splats, reason));
+        if (told == 0)
+            progress_.note(
+                fmt::format("growth stops at {} splats: {}", count_text(splats), reason));
         log_.growth_stopped(trainer_.iteration(), limit, told = splats);
     };
     tell(trainer_.stopped_by_memory(), told_by_memory_, "memory", "--max-memory");

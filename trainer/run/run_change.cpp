@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "trainer/run/run_change.h"
+#include "engine/core/count_text.h"
 
 #include <fmt/format.h>
 
@@ -7,8 +8,8 @@ namespace darb {
 
 namespace {
 
-std::string count_text(std::uint32_t splats) {
-    return splats == kAnyNumberOfSplats ? "any number" : fmt::format("{}", splats);
+std::string most_text(std::uint32_t splats) {
+    return splats == kAnyNumberOfSplats ? "any number" : count_text(splats);
 }
 
 std::string memory_text(std::uint64_t bytes) {
@@ -54,7 +55,7 @@ std::string change_text(const TrainOptions& before, const TrainOptions& after) {
     if (before.iterations != after.iterations)
         add(fmt::format("iterations {} instead of {}", after.iterations, before.iterations));
     const auto splats = [](const TrainOptions& o) {
-        return count_text(o.max_splats.value_or(kAnyNumberOfSplats));
+        return most_text(o.max_splats.value_or(kAnyNumberOfSplats));
     };
     if (before.max_splats != after.max_splats)
         add(fmt::format("at most {} splats instead of {}", splats(after), splats(before)));
