@@ -2,6 +2,7 @@
 #include "viewer/commands.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "viewer/controls.h"
@@ -82,7 +83,8 @@ void stop_and_close(Session& s) {
     s.error.clear();
     s.help = false;
     s.close_menus = true;
-    s.open_dialog.shown = false;
+    // the dialog may lie over the form
+    if (!std::exchange(s.open_dialog.shown, false)) s.train_form.shown = false;
     choose_tool(Tool::navigate, s);
     s.ask(request::CancelLoad{});
     s.ask(request::CancelWork{});
@@ -132,8 +134,18 @@ constexpr Command kCommands[] = {
      "Add the splats of another file as a layer, at the positions that they have there",
      Icon::none,
      false,
-     [](Session& s) { s.ask(request::ShowOpen{true}); },
+     [](Session& s) { s.ask(request::ShowOpen{OpenFor::adding}); },
      has_scene,
+     nullptr},
+    {Key::train,
+     Menu::file,
+     "Train from photos ...",
+     {"Ctrl+T"},
+     "Make a scene of a folder of photos, a video or a data set, and watch it grow",
+     Icon::none,
+     false,
+     [](Session& s) { s.ask(request::ShowTrain{}); },
+     [](const Session& s) { return s.train_form.offered() && !run_goes_on(s); },
      nullptr},
     {Key::save,
      Menu::file,

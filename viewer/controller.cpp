@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
 #include "engine/scene/splat_file.h"
@@ -110,7 +111,7 @@ void Controller::merge(LoadedScene loaded) {
     std::string said = fmt::format(
         "merged {} splats of {}: they are selected, and 6, 7 and 8 move, turn and "
         "scale them",
-        count, from);
+        count_text(count), from);
     if (unit > 0 && ours > 0 && std::abs(unit / ours - 1) > 1e-6)
         said += fmt::format(
             "\nA unit of it is {:.4g} m, and of the scene {:.4g} m: scale it by "
@@ -151,7 +152,8 @@ void Controller::act(int width, int height) {
             document_->need_scene("measurement");
             painter_->start_measure(width, height);
         },
-        [&](request::ShowOpen open) { show_open(open.merges); },
+        [&](request::ShowOpen open) { show_open(open.purpose); },
+        [&](const request::ShowTrain& train) { show_train(train.dataset); },
         [&](const request::Open& open) { open_file(open.file, open.merges); },
         [&](request::ShowEdits) { show_edits(); },
         [&](request::Save) { document_->save(*device_); },
@@ -209,6 +211,8 @@ void Controller::drop(const fs::path& path, bool adds) {
     Session& s = *session_;
     if (s.training.live && !s.training.finished)
         s.tell("A run is shown; files can be opened when it is over.");
+    else if (s.train_form.offered() && document_->trains_on(path))
+        show_train(fs::absolute(path));
     else if (s.scene && !s.scene->is_points && is_mesh_file(path))
         open_mesh(path);  // it is shown with the scene
     else if (adds && s.scene)
@@ -219,12 +223,22 @@ void Controller::drop(const fs::path& path, bool adds) {
         document_->load(path, true);
 }
 
-void Controller::show_open(bool merges) {
+void Controller::show_open(OpenFor purpose) {
     OpenDialog& dialog = session_->open_dialog;
-    dialog.shown = !dialog.shown || dialog.merges != merges;
-    dialog.merges = merges;
+    dialog.shown = !dialog.shown || dialog.purpose != purpose;
+    dialog.purpose = purpose;
     dialog.recent = document_->recent();
-    if (!dialog.folder.empty()) dialog.entries = list_folder(dialog.folder);
+    if (!dialog.folder.empty()) dialog.entries = list_folder(dialog.folder, purpose);
+}
+
+void Controller::show_train(const fs::path& dataset) {
+    TrainForm& form = session_->train_form;
+    if (!form.offered() || form.runs) return;
+    form.shown = true;
+    TrainField* const field = form.field(kDatasetField);
+    if (dataset.empty() || field == nullptr) return;
+    field->typed = dataset.string();
+    ++form.version;
 }
 
 void Controller::open_file(const fs::path& file, bool merges) {
@@ -299,7 +313,7 @@ void Controller::take_picture(int width, int height) {
 
 // Asks first where something is not saved.
 void Controller::quit() {
-    if (unsaved_edits(*session_) || unsaved_mesh(*session_))
+    if (asks_before_quitting(*session_))
         session_->leaving = Leaving{true, {}};
     else
         session_->for_window.push_back(WindowRequest::close);

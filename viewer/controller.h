@@ -37,7 +37,8 @@ class Controller {
   private:
     void take(LoadedScene loaded);
     void drop(const std::filesystem::path& path, bool adds = false);
-    void show_open(bool merges);
+    void show_open(OpenFor purpose);
+    void show_train(const std::filesystem::path& dataset);
     void open_file(const std::filesystem::path& file, bool merges);
     void merge(LoadedScene loaded);
     void show_edits();

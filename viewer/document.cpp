@@ -12,6 +12,7 @@
 #include <string_view>
 #include <utility>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
@@ -157,7 +158,8 @@ bool Document::show(std::unique_ptr<Scene> scene, const fs::path& asked, bool dr
     session_->mesh_wish = {};
     session_->fly_speed = s.subject.radius / 2;
     show_as_meant(s, first);
-    const std::string what = s.mesh ? s.format : fmt::format("{} splats", s.model.size());
+    const std::string what =
+        s.mesh ? s.format : fmt::format("{} splats", count_text(s.model.size()));
     tell(options_.quiet ? nullptr : stdout, "loaded {}: {} in {:.2f} s\neffects: {}\n",
          s.file.string(), what, s.load_s, plan_line(*session_->plan));
     for (const std::string& note : s.is_points ? std::vector<std::string>{} : s.notes)
@@ -395,6 +397,31 @@ void Document::follow_plan() {
     d.sh_degree = plan.row(EFFECT_VIEW_COLOUR).degree;
 }
 
+void Document::make_room_for_run(std::vector<View> views) {
+    Session& s = *session_;
+    cancel_load();
+    s.scene.reset();
+    s.edit = Edit();
+    s.tools = {};
+    s.outliner = {};
+    s.project = {};
+    s.note_draft = {};
+    s.selection.shown = false;
+    s.measured.clear();
+    s.plan.reset();
+    s.leaving.reset();
+    s.up_is_guess = false;
+    s.training = {};
+    s.run_desk = {};
+    drawn_model_ = measured_model_ = 0;
+    s.photos = Photos();
+    s.thumbnails.reset();
+    s.guides.cameras_measured = 0;
+    s.photos.views = without_shutters(std::move(views));
+    if (const auto up = up_of_cameras(cameras_of(s.photos.views))) s.navigation.set_up(*up);
+    if (!s.photos.views.empty()) choose_camera(0);
+}
+
 void Document::follow_run(LivePicture& pictures, const Bounds& bounds, const LiveScene& scene) {
     live_ = &pictures;
     live_bounds_ = session_->run_bounds = bounds;
@@ -496,8 +523,8 @@ void Document::save_project() {
     s.project.file = file;
     s.edit.mark_saved();
     s.path.mark_saved();
-    s.tell(fmt::format("saved the project of {} layer{} to {}", s.edit.layers().size(),
-                       s.edit.layers().size() == 1 ? "" : "s", file.string()));
+    s.tell(fmt::format("saved the project of {} to {}", counted(s.edit.layers().size(), "layer"),
+                       file.string()));
 }
 
 void Document::save_script() {
@@ -509,7 +536,7 @@ void Document::save_script() {
     const std::vector<EditOperation> operations = s.edit.operations();
     write_edit_script(file, operations);
     saved_.wrote(file);
-    s.tell(fmt::format("saved {} edits to {}", operations.size(), file.string()));
+    s.tell(fmt::format("saved {} to {}", counted(operations.size(), "edit"), file.string()));
 }
 
 namespace {
@@ -547,7 +574,8 @@ void Document::save_scene(Device& device, const std::string& layer) {
     write_encoded(file, encode_scene(*format, model, file.string(), options));
     saved_.wrote(file);
     if (!keeps_project(s)) s.edit.mark_saved();
-    std::string said = fmt::format("saved {} splats to {}", model.size(), file.string());
+    std::string said =
+        fmt::format("saved {} splats to {}", count_text(model.size()), file.string());
     if (layer.empty())
         for (const std::string& loss : s.edit.losses_together()) said += "\n" + loss;
     for (const std::string& loss : losses_of(*format, model)) said += "\n" + loss;
@@ -562,7 +590,7 @@ void Document::save_mesh() {
     write_mesh(s.mesh_file, s.mesh->mesh);
     saved_.wrote(s.mesh_file);
     s.mesh->file = s.mesh_file;
-    s.tell(fmt::format("saved a mesh of {} faces to {}", s.mesh->mesh.face_count(),
+    s.tell(fmt::format("saved a mesh of {} faces to {}", count_text(s.mesh->mesh.face_count()),
                        s.mesh_file.string()));
 }
 

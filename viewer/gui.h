@@ -70,6 +70,7 @@ inline constexpr ThemeColour kButton = theme_colour(palette::kButton);
 inline constexpr ThemeColour kHovered = theme_colour(palette::kHovered);
 inline constexpr ThemeColour kActive = theme_colour(palette::kActive);
 inline constexpr ThemeColour kError = theme_colour(palette::kError);
+inline constexpr ThemeColour kComplaint = theme_colour(palette::kComplaint);  // text, on kWindow
 inline constexpr ThemeColour kAccent = theme_colour(palette::kAccent);
 inline constexpr ThemeColour kGrab = theme_colour(palette::kGrab);  // values are written on it
 

@@ -19,6 +19,7 @@ namespace darb {
 enum class Key {
     open,
     merge,
+    train,
     save,
     save_page,
     picture,
@@ -81,6 +82,9 @@ struct Input {
     std::vector<std::filesystem::path> dropped;
 };
 
+/// What a file or a folder is chosen for.
+enum class OpenFor { showing, adding, training };
+
 /// What of a training run may change while it goes on; 0: as it is.
 struct RunSettings {
     int iterations = 0;            // of the whole run
@@ -117,8 +121,11 @@ struct LeavePhoto {};
 struct FollowPlan {};  // sets the effects as planned
 struct Measure {};     // measures accuracy settings and effects
 struct ShowOpen {
-    bool merges = false;
+    OpenFor purpose = OpenFor::showing;
 };  // opens the dialog
+struct ShowTrain {
+    std::filesystem::path dataset;  // empty: as it was typed
+};                                  // opens the form that begins a training run
 struct Open {
     std::filesystem::path file;
     bool merges = false;  // adds it to the current scene
@@ -170,9 +177,9 @@ struct LeaveFullScreen {};
 using Request =
     std::variant<request::FrameAll, request::Frame, request::TakePicture, request::ChooseCamera,
                  request::LeavePhoto, request::FollowPlan, request::Measure, request::ShowOpen,
-                 request::Open, request::ShowEdits, request::Save, request::SaveScene,
-                 request::SaveProject, request::SaveScript, request::SavePage, request::LoadPath,
-                 request::SavePath, request::ExportPath, request::CancelLoad,
+                 request::ShowTrain, request::Open, request::ShowEdits, request::Save,
+                 request::SaveScene, request::SaveProject, request::SaveScript, request::SavePage,
+                 request::LoadPath, request::SavePath, request::ExportPath, request::CancelLoad,
                  request::FindFreeSpace, request::CancelWork, request::PickPoint, request::Flood,
                  request::OpenMesh, request::MakeMesh, request::SaveMesh, request::CloseMesh,
                  request::AskRun, request::Quit, request::SaveAndLeave, request::Leave,

@@ -10,6 +10,7 @@
 #include <limits>
 #include <utility>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "viewer/seconds.h"
 #include "viewer/view_camera.h"
@@ -103,7 +104,7 @@ void Painter::start_mesh_of_scene() {
 void Painter::take_mesh(bool wait) {
     std::optional<ShownMesh> mesh = work_.take_mesh(wait);
     if (!mesh) return;
-    std::string said = fmt::format("a mesh of {} faces", mesh->mesh.face_count());
+    std::string said = fmt::format("a mesh of {} faces", count_text(mesh->mesh.face_count()));
     for (const std::string& note : mesh->notes) said += "\n" + note;
     show_mesh(std::move(*mesh));
     session_->tell(said);
@@ -182,6 +183,14 @@ void Painter::show_marks(bool highlight) {
 }
 
 void Painter::begin_run() {
+    picture_.clear();
+    work_.cancel_mesh();
+    if (session_->mesh) close_mesh();
+    under_way_.clear();
+    copies_.at = 0;
+    warm_up_.thread.reset();
+    lose_scene("a training run began");
+    shown_model_ = shown_edit_ = 0;
     shares_.clear();
     pacing_.motion().start({});
 }

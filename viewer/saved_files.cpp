@@ -13,6 +13,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/text.h"
+#include "engine/data/video.h"
 #include "engine/mesh/mesh_file.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/session.h"
@@ -215,7 +216,7 @@ constexpr std::size_t kMostEntries = 5'000;
 
 }  // namespace
 
-std::vector<FolderEntry> list_folder(const std::filesystem::path& folder) {
+std::vector<FolderEntry> list_folder(const std::filesystem::path& folder, OpenFor purpose) {
     std::vector<FolderEntry> entries;
     std::error_code error;
     for (std::filesystem::directory_iterator at(folder, error), end;
@@ -223,10 +224,12 @@ std::vector<FolderEntry> list_folder(const std::filesystem::path& folder) {
         std::error_code none;
         const std::string name = at->path().filename().string();
         const bool is_folder = at->is_directory(none);
-        const bool is_scene = at->is_regular_file(none) &&
-                              (names_scene(at->path()) || has_extension(at->path(), ".obj") ||
-                               is_project_file(at->path()));
-        if (!name.starts_with('.') && (is_folder || is_scene)) entries.push_back({name, is_folder});
+        const bool listed = purpose == OpenFor::training
+                                ? is_video_name(at->path()) || has_extension(at->path(), ".json")
+                                : names_scene(at->path()) || has_extension(at->path(), ".obj") ||
+                                      is_project_file(at->path());
+        if (!name.starts_with('.') && (is_folder || (listed && at->is_regular_file(none))))
+            entries.push_back({name, is_folder});
     }
     std::sort(entries.begin(), entries.end(), [](const FolderEntry& a, const FolderEntry& b) {
         return a.folder != b.folder ? a.folder : a.name < b.name;

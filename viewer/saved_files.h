@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "viewer/input.h"
+
 namespace darb {
 
 struct Session;
@@ -70,7 +72,8 @@ class RememberedUp {
 /// throws Error.
 std::string recover_unsaved(const Session& session);
 
-// What an open dialog lists of a folder: subfolders, and files that may hold splats.
+// What an open dialog lists of a folder: subfolders, and files that may hold splats, or else what a
+// run can train on.
 
 struct FolderEntry {
     std::string name;
@@ -79,6 +82,7 @@ struct FolderEntry {
 
 /// Folders first, each group in the order of names, without hidden ones. Empty where the folder
 /// cannot be read.
-std::vector<FolderEntry> list_folder(const std::filesystem::path& folder);
+std::vector<FolderEntry> list_folder(const std::filesystem::path& folder,
+                                     OpenFor purpose = OpenFor::showing);
 
 }  // namespace darb

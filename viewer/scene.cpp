@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/las_points.h"
@@ -72,7 +73,8 @@ Scene mesh_scene_of(std::span<const std::byte> bytes, const std::filesystem::pat
     if (progress) progress(kReadShare + kDecodeShare, "measuring");
     scene.model = points_as_splats(vertices_of(mesh));
     scene.is_points = true;
-    scene.format = holds_faces ? fmt::format("mesh of {} faces", mesh.face_count()) : "point cloud";
+    scene.format = holds_faces ? fmt::format("mesh of {} faces", count_text(mesh.face_count()))
+                               : "point cloud";
     scene.notes = notes;
     if (holds_faces) {
         scene.mesh = shown_mesh_of(std::move(mesh), scene.file, {});

@@ -30,6 +30,7 @@
 #include "viewer/scene.h"
 #include "viewer/thumbnails.h"
 #include "viewer/tools.h"
+#include "viewer/train_form.h"
 
 namespace darb {
 
@@ -101,10 +102,13 @@ struct Toast {
 };
 
 struct OpenDialog {
-    bool shown = false, merges = false;
+    bool shown = false;
+    OpenFor purpose = OpenFor::showing;
     std::filesystem::path folder;
     std::vector<FolderEntry> entries;           // what the folder holds
     std::vector<std::filesystem::path> recent;  // latest first
+    std::filesystem::path counted;              // the folder whose photos were counted
+    std::size_t photos = 0;
 };
 
 /// A box or a sphere whose splats an edit selects or deletes.
@@ -211,6 +215,7 @@ struct AskedState {
     std::vector<WindowRequest> for_window;  // from the last frame
     ToolState tools;
     OpenDialog open_dialog;
+    TrainForm train_form;
     OutlinerState outliner;
     NoteDraft note_draft;
     std::optional<Leaving> leaving;  // waits for an answer
@@ -233,6 +238,9 @@ struct AskedState {
 
 /// All three parts, for the panels.
 struct Session : ShownState, PaintedState, AskedState {};
+
+/// Whether closing the window ends something that goes on or loses something.
+bool asks_before_quitting(const Session& session);
 
 inline bool unsaved_edits(const ShownState& s) {
     return s.scene && s.edit.unsaved();

@@ -124,6 +124,7 @@ void SplatPicture::clear() {
     slots_.clear();
     live_ = nullptr;
     model_ = nullptr;
+    marks_ = {};
 }
 
 void SplatPicture::set_marks(const std::vector<std::uint8_t>& unseen,

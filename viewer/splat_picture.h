@@ -71,6 +71,7 @@ class SplatPicture {
     /// Shows splats that someone else owns and changes (a training run). Display styles that need
     /// the model on the host fall back to splats.
     void set_live(const GpuSplats& splats, const Bounds& bounds);
+    /// Lets go of the scene and of a mesh.
     void clear();
     bool empty() const { return splats() == nullptr; }
     std::uint32_t splat_count() const { return splats() ? splats()->count() : 0; }

@@ -81,6 +81,11 @@ void Viewer::finish_loading() {
     painter_.finish_mesh();
 }
 
+void Viewer::make_room_for_run(std::vector<View> views) {
+    painter_.begin_run();
+    document_.make_room_for_run(std::move(views));
+}
+
 void Viewer::show_live(LivePicture& pictures, const Bounds& bounds, const LiveScene& scene) {
     painter_.begin_run();
     document_.follow_run(pictures, bounds, scene);

@@ -24,6 +24,8 @@ class Viewer {
     bool loading() const { return document_.loading(); }
     /// Waits for the load. Throws its Error.
     void finish_loading();
+    /// Closes what is shown, without a question, and takes the cameras of a run that will follow.
+    void make_room_for_run(std::vector<View> views);
     /// Shows the pictures of a training run, which must stay where they are until end_live.
     /// TrainingCurves has the rest.
     void show_live(LivePicture& pictures, const Bounds& bounds, const LiveScene& scene);

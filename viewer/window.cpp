@@ -279,7 +279,7 @@ void ViewerWindow::State::toggle_full_screen() {
 void ViewerWindow::State::close_minimised() {
     const Session& session = viewer->session();
     if (!asks_for<request::Quit>(session.requests)) return;
-    if (session.edit.unsaved())
+    if (asks_before_quitting(session))
         glfwRestoreWindow(window.handle);
     else
         glfwSetWindowShouldClose(window.handle, GLFW_TRUE);

@@ -65,6 +65,8 @@ inline constexpr PaletteColour kHovered = palette_colour(0x2c4a74);
 inline constexpr PaletteColour kActive = palette_colour(0x1f4d84);
 inline constexpr PaletteColour kGrab = palette_colour(0x326bb0);
 inline constexpr PaletteColour kError = palette_colour(0x7b191e);
+/// Words about what was typed wrongly, on the page.
+inline constexpr PaletteColour kComplaint = palette_colour(0xff9c96);
 
 }  // namespace palette
 

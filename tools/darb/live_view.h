@@ -12,8 +12,6 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "trainer/run/run.h"
-#include "viewer/bounds.h"
-#include "viewer/session.h"
 
 namespace darb {
 
@@ -29,17 +27,15 @@ class LiveView {
     /// the run goes on.
     LiveAnswer show(const LiveStep& step);
     /// Whether the user stopped the run and wants a web page of it.
-    bool publishes() const { return publishes_; }
+    bool publishes() const;
     /// The run is over: shows its scene until the window is closed, and says this first; empty:
     /// nothing.
     void finish(const std::filesystem::path& model, const std::string& said = {});
 
   private:
-    double wait_while_paused(const LiveStep& step);
-    LiveAnswer take_wishes(double paused_s);
     void warn(const std::string& reason);
     std::unique_ptr<State> state_;
-    bool publishes_ = false;
+    bool publishes_ = false;  // as it was when the window was closed
 };
 
 /// Starts the window system, which must happen before the device is made; does nothing where `on`
@@ -58,25 +54,5 @@ class LiveSystem {
     struct System;
     std::unique_ptr<System> system_;
 };
-
-// What a live view of training shows besides the picture: curves of the run, bounds of its scene.
-
-struct LiveCurves {
-    /// Adds one step; thins the curves out as they get long.
-    void add(const LiveStep& step, TrainingCurves& curves);
-
-    float loss = 0, psnr_db = 0;  // smoothed
-    int stride = 1;               // iterations for each value of a curve
-    int last = 0;                 // the last iteration that was added
-};
-
-/// What a change that the window asks for means to the run. now: as the run has them.
-RunChange change_of(const RunSettings& wanted, const RunSettings& now);
-/// The settings that the window shows.
-RunSettings settings_of(const TrainOptions& options);
-
-/// The bounds of the sparse points that the cameras look at, or of the cameras where there are
-/// none.
-Bounds bounds_of(const Dataset& dataset);
 
 }  // namespace darb

@@ -13,6 +13,9 @@ LiveView::~LiveView() = default;
 LiveAnswer LiveView::show(const LiveStep&) {
     return 0;
 }
+bool LiveView::publishes() const {
+    return false;
+}
 void LiveView::finish(const std::filesystem::path&, const std::string&) {}
 
 LiveSystem::LiveSystem(bool on, const DeviceOptions&) {

@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/core/system.h"
@@ -57,11 +58,6 @@ int train_blocks(Ranks& ranks, const TrainRequest& request, const RunShown& show
 /// their options are.
 void take_tuning_of_first(Ranks& ranks, Device& device, bool keeps_own);
 
-namespace {
-
-// Writes the scene as a web page with the photos' cameras as bookmarks; also for a run that was
-// finished before, where there is no page yet. publishes: the user stopped the run for it. Returns
-// whether it did.
 bool leave_page(Device& device, const TrainJob& job, const TrainResult& result, bool publishes) {
     const TrainRequest& request = job.request;
     const std::filesystem::path file = request.output / "scene.html";
@@ -76,6 +72,8 @@ bool leave_page(Device& device, const TrainJob& job, const TrainResult& result, 
                                              job.dataset.views, file));
     return true;
 }
+
+namespace {
 
 void refuse_stereo(const TrainJob& job, int ranks) {
     if (ranks == 1 || !starts_from_stereo(job)) return;
@@ -221,7 +219,8 @@ void print_blocks_plan(const Device& device, const TrainJob& job) {
     const Dataset& dataset = job.dataset;
     const std::size_t held_out = held_out_views(dataset.views).size();
     say("{}: {}, {} photos to train on, {} held out, {} points\n", dataset.root.string(),
-        dataset.source, dataset.views.size() - held_out, held_out, dataset.points.size());
+        dataset.source, count_text(dataset.views.size() - held_out), count_text(held_out),
+        count_text(dataset.points.size()));
     say_notes(dataset.notes);
     say("device: {}\neffects: {}\n", device.description(), plan_line(job.effects));
     if (!job.strategy_note.empty()) say("{}\n", job.strategy_note);

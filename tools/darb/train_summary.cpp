@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "engine/core/count_text.h"
 #include "engine/core/system.h"
 #include "engine/core/text.h"
 #include "engine/ranks/ranks.h"
@@ -53,7 +54,7 @@ std::string summary_text(const TrainResult& summary, const RunShown& shown,
     if (!quiet && !summary.evaluations.empty()) {
         const Evaluation& e = summary.evaluations.back();
         text += fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
-                            e.splats);
+                            count_text(e.splats));
     }
     if (!quiet) text += ranks_text(ranks, summary);
     if (!quiet && shown.verbose) text += passes_text(summary.passes);
@@ -66,7 +67,7 @@ std::string summary_text(const TrainResult& summary, const RunShown& shown,
         text += fmt::format(
             "         of {} splats; of those too transparent to be drawn {} were left out, and {} "
             "had left the run before\n",
-            summary.saved, summary.undrawn, summary.dropped);
+            count_text(summary.saved), count_text(summary.undrawn), count_text(summary.dropped));
     if (!summary.pictures.empty()) written("picture", summary.pictures.front().file);
     written("report", summary.report);
     if (summary.interrupted)

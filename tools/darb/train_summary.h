@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <string>
 
+#include "engine/gpu/device.h"
+#include "trainer/job/job.h"
 #include "trainer/run/run.h"
 
 namespace darb {
@@ -19,5 +21,10 @@ struct RunShown {
 /// it in its folder `output`.
 std::string summary_text(const TrainResult& summary, const RunShown& shown,
                          const std::filesystem::path& output, const RankGroup& ranks);
+
+/// Writes the scene as a web page with the photos' cameras as bookmarks; also for a run that was
+/// finished before, where there is no page yet. publishes: the user stopped the run for it. Returns
+/// whether it did.
+bool leave_page(Device& device, const TrainJob& job, const TrainResult& result, bool publishes);
 
 }  // namespace darb

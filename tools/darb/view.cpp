@@ -33,6 +33,7 @@
 #include "tools/darb/flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/train_window.h"
 #include "trainer/job/scene_file.h"
 #include "viewer/controls.h"
 #include "viewer/picture_pacing.h"
@@ -175,6 +176,7 @@ int view(ViewFlags flags) {
     refuse_frames_among_photos(flags.frames, options.views);
     if (!note.empty()) say("warning: {}\n", note);
     options.resolve = find_scene;
+    options.trains_on = can_train_on;
     options.start_at_camera = true;
     if (const auto kept = state_folder(); !kept.empty()) {
         options.up_list = kept / "up.json";
@@ -480,7 +482,8 @@ namespace {
 constexpr double kSignalNap_s = 0.2;  // between looks for signals and for the end of the display
 
 // Where the window ends by itself, unsaved work is kept.
-int show_until_closed(ViewerWindow& window, const std::atomic<bool>& lost) {
+int show_until_closed(ViewerWindow& window, const std::string& device,
+                      const std::atomic<bool>& lost) {
     const std::atomic<bool>& stop = stop_on_signals();
     const auto recovered = [&](const std::string& hint) {
         const std::string kept = recover_unsaved(window.viewer().session());
@@ -488,8 +491,12 @@ int show_until_closed(ViewerWindow& window, const std::atomic<bool>& lost) {
                (kept.empty() ? "There were no changes to save." : kept);
     };
     try {
-        while (!stop && window.pump(kSignalNap_s))
+        TrainWindow training(window, device);
+        double nap_s = kSignalNap_s;
+        while (!stop && window.pump(nap_s)) {
             if (lost) throw Error("window", "the display is gone");
+            nap_s = std::min(kSignalNap_s, training.follow());
+        }
     } catch (const std::exception& e) {  // also where memory runs out
         if (lost) throw Error("window", "the display is gone", recovered(""));
         const auto* known = dynamic_cast<const Error*>(&e);
@@ -521,7 +528,7 @@ int view_in_window(const ViewFlags& flags, const ViewerOptions& options, const P
         window.viewer().open(flags.scene);
         window.set_title(scene_name(flags.scene, true) + " - darb");
     }
-    if (flags.times.empty()) return show_until_closed(window, lost);
+    if (flags.times.empty()) return show_until_closed(window, flags.device, lost);
     write_view_times(window, device, lost, flags.times);
     return 0;
 }

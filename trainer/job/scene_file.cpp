@@ -122,6 +122,13 @@ std::optional<Other> other_file(const fs::path& path) {
 
 }  // namespace
 
+bool can_train_on(const fs::path& path) {
+    std::error_code none;
+    if (!fs::is_directory(path, none)) return is_video_name(path);
+    const bool run = fs::exists(path / "run.jsonl", none) || fs::exists(path / "run.lock", none);
+    return !run && (holds_cameras(path) || has_photos(path) || has_photos(path / "images"));
+}
+
 fs::path log_of_run(const fs::path& scene) {
     std::error_code none;
     fs::path folder = fs::absolute(scene, none), log = folder / "run.jsonl";

@@ -13,6 +13,10 @@ namespace darb {
 /// A splat file, the output folder of a training run or a SOG scene, rather than a data set.
 bool is_scene(const std::filesystem::path& path);
 
+/// Whether it looks like what a run can train on: a video, a folder of photos, or a data set. It
+/// looks at names alone.
+bool can_train_on(const std::filesystem::path& path);
+
 /// path itself; of a folder with point_cloud/iteration_N/point_cloud.ply the one that its
 /// metrics.json ends with, else of the largest N. Throws Error for a folder without one that is no
 /// SOG scene either.

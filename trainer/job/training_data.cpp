@@ -91,6 +91,7 @@ fs::path photos_of_video(const fs::path& video, TrainRequest& request, std::opti
     need_programs(video);
     lock.emplace(request.output);
     if (!sinks.quiet) say("{}: looking for its sharpest pictures\n", video.string());
+    if (sinks.said) sinks.said("looking for the sharpest pictures of the video");
     const std::vector<double> sharpness = video_sharpness(video);
     const std::size_t wanted =
         request.frames > 0 ? static_cast<std::size_t>(request.frames)
@@ -115,17 +116,21 @@ void check_output(const fs::path& photos, const fs::path& output) {
 /// What COLMAP is at: a line in place on a terminal, else one now and then.
 class ColmapScreen {
   public:
-    explicit ColmapScreen(bool quiet) : quiet_(quiet), terminal_(is_terminal(stderr)) {}
+    explicit ColmapScreen(const DataSinks& sinks)
+        : sinks_(&sinks), quiet_(sinks.quiet), terminal_(is_terminal(stderr)) {}
     ~ColmapScreen() { clear(); }
     ColmapScreen(const ColmapScreen&) = delete;
     ColmapScreen& operator=(const ColmapScreen&) = delete;
     void note(std::string_view text) {
+        if (sinks_->said) sinks_->said(text);
         if (quiet_) return;
         clear();
         say_text(printable(text) + "\n");
     }
     void progress(std::size_t step, const ColmapOutput& output, double seconds, double left) {
-        if (quiet_ || output.total() == 0) return;
+        if (output.total() == 0) return;
+        if (sinks_->said) sinks_->said(colmap_progress_text(step, output, seconds, left));
+        if (quiet_) return;
         if (step != step_) told_ = 0;
         const bool ended = output.done() == output.total() && done_ != output.done();
         if (!terminal_ && seconds - told_ < kLineSeconds && !ended) return;
@@ -142,6 +147,7 @@ class ColmapScreen {
         if (shown_) say_text("\r\033[K");
         shown_ = false;
     }
+    const DataSinks* sinks_;
     bool quiet_, terminal_, shown_ = false;
     std::size_t step_ = 0, done_ = 0;
     double told_ = 0;  // seconds of the step
@@ -239,7 +245,7 @@ fs::path make_dense(ColmapRun& run, const PhotoList& list, bool panoramas,
         if (fits && is_colmap_model(dense / "sparse")) return dense;
     }
     if (is_installed("colmap")) write_file_atomic(list_file, made.size + made.photos);
-    ColmapScreen screen(sinks.quiet);
+    ColmapScreen screen(sinks);
     ColmapReports reports;
     reports.note = [&](std::string_view text) { screen.note(text); };
     reports.progress = [&](std::size_t step, const ColmapOutput& output, double spent,

@@ -5,8 +5,10 @@
 
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "engine/data/dataset.h"
 #include "engine/data/run_colmap.h"
@@ -17,8 +19,9 @@ namespace darb {
 
 /// Who hears of what COLMAP and ffmpeg do.
 struct DataSinks {
-    bool quiet = false;                       // nothing on the terminal
-    const std::atomic<bool>* stop = nullptr;  // set by others: COLMAP is ended
+    bool quiet = false;                               // nothing on the terminal
+    const std::atomic<bool>* stop = nullptr;          // set by others: COLMAP is ended
+    std::function<void(std::string_view)> said = {};  // each line of progress; may be empty
 };
 
 /// Throws Error where there are several ranks and the data set is a video, or photos without

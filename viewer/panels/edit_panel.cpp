@@ -34,7 +34,8 @@ void line(const Camera& camera, const glm::dvec3& a, const glm::dvec3& b) {
     const auto at = [](const glm::dvec2& p) {
         return ImVec2(static_cast<float>(p.x), static_cast<float>(p.y));
     };
-    ImGui::GetBackgroundDrawList()->AddLine(at((*px)[0]), at((*px)[1]), kOutline, 1.5f);
+    const ImVec2 ends[] = {at((*px)[0]), at((*px)[1])};
+    outlined(*ImGui::GetBackgroundDrawList(), ends, kOutline, 1.5f);
 }
 
 void draw_box(const Camera& camera, const Region& r) {
@@ -69,11 +70,11 @@ void tool_settings(Session& s) {
         static_cast<Key>(static_cast<int>(Key::tool_navigate) + static_cast<int>(s.tools.tool)));
     ImGui::TextWrapped("%s: %s", c.name, c.tip);
     if (s.tools.tool == Tool::flood) {
-        ImGui::SliderFloat("colours", &s.tools.tolerance, 0, 1, "within %.2f", kClamped);
+        slider("colours", &s.tools.tolerance, 0, 1, "within %.2f", kClamped);
         tip("How far each channel may be from the colour of the first splat, 0 to 1");
     }
     if (s.tools.tool != Tool::brush) return;
-    ImGui::SliderFloat("brush", &s.tools.brush_px, 4, 300, "%.0f px", kLogarithmic);
+    slider("brush", &s.tools.brush_px, 4, 300, "%.0f px", kLogarithmic);
     tip("Radius of the brush on the screen");
 }
 
@@ -192,7 +193,7 @@ void select_by_value(Session& s) {
     tip("The colour to look for, sRGB");
     ImGui::SameLine();
     ImGui::SetNextItemWidth(110 * s.gui_scale);
-    ImGui::SliderFloat("##tolerance", &t.tolerance, 0, 1, "within %.2f", kClamped);
+    slider("##tolerance", &t.tolerance, 0, 1, "within %.2f", kClamped);
     tip("How far each channel may be from it, 0 to 1");
     ImGui::SameLine();
     if (ImGui::Button("colour")) select(by::Colour{glm::dvec3(t.colour), double{t.tolerance}}, s);
@@ -207,23 +208,23 @@ void clean_up(Session& s) {
     const float width = 130 * s.gui_scale;
     ImGui::TextDisabled("Each selects; look, then press Delete.");
     ImGui::SetNextItemWidth(width);
-    ImGui::SliderFloat("##isolated", &t.isolated, 0.0001f, 0.5f, "below %.4f", kLogarithmic);
+    slider("##isolated", &t.isolated, 0.0001f, 0.5f, "below %.4f", kLogarithmic);
     tip("Share of the heaviest part, by opacity times area");
     ImGui::SameLine();
     if (ImGui::Button("isolated parts")) select(by::Isolated{double{t.isolated}}, s);
     tip("Parts that touch nothing else and are light; Shift adds, Ctrl takes away");
     ImGui::SetNextItemWidth(width / 2 - 2);
-    ImGui::SliderFloat("##faint", &t.haze_opacity, 0.01f, 0.5f, "%.2f", kClamped);
+    slider("##faint", &t.haze_opacity, 0.01f, 0.5f, "%.2f", kClamped);
     tip("Highest opacity of haze, 0 to 1");
     ImGui::SameLine(0, 4);
     ImGui::SetNextItemWidth(width / 2 - 2);
-    ImGui::SliderFloat("##large", &t.haze_size, 1, 50, "%.1f x", kLogarithmic);
+    slider("##large", &t.haze_size, 1, 50, "%.1f x", kLogarithmic);
     tip("Least size of haze, in times of the median size");
     ImGui::SameLine();
     if (ImGui::Button("haze")) select(by::Haze{double{t.haze_opacity}, double{t.haze_size}}, s);
     tip("Splats that are large and faint; Shift adds, Ctrl takes away");
     ImGui::SetNextItemWidth(width);
-    ImGui::SliderInt("##views", &t.looked_through, 1, 20, "%d photos", kClamped);
+    slider("##views", &t.looked_through, 1, 20, "%d photos", kClamped);
     tip("How many photos must look through a splat");
     ImGui::SameLine();
     ImGui::BeginDisabled(s.photos.views.empty());
@@ -306,8 +307,7 @@ void edit_panel(Session& s) {
 void save_panel(Session& s) {
     ImGui::TextDisabled("Save as");
     ImGui::SetNextItemWidth(-FLT_MIN);
-    path_field("##save", s.save_file);
-    tip("The ending of the name decides the format");
+    path_field("##save", s.save_file, "The ending of the name decides the format");
     if (ImGui::Button("Save")) s.ask(request::SaveScene{});
     tip("Save the visible layers together as one file; Ctrl+S does the same where there is one "
         "layer and no project");

@@ -21,8 +21,10 @@ namespace darb {
 namespace {
 
 constexpr std::size_t kMostCameras = 1500;  // drawn at a time
+constexpr float kAxesMargin = 8;            // px at scale 1, around the axes
 constexpr float kClick = 4;                 // px at scale 1 that a click may move
-constexpr ImU32 kGridLine = IM_COL32(235, 240, 250, 70), kShadow = IM_COL32(10, 12, 15, 150);
+constexpr ImU32 kGridLine = IM_COL32(235, 240, 250, 90), kGridEdge = IM_COL32(10, 12, 15, 60);
+constexpr ImU32 kShadow = IM_COL32(10, 12, 15, 150);
 constexpr ImU32 kGround = IM_COL32(20, 23, 27, 225);
 
 ImVec2 vec(const glm::dvec2& p) {
@@ -49,9 +51,11 @@ void draw_grid(Session& s, const Camera& camera) {
     const double unit = s.scene ? s.edit.facts().metres_per_unit : 0;
     const GroundGrid grid = ground_grid(seen_bounds(s), s.guides.up, s.guides.ground, unit);
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    for (const Segment& line : grid.lines)
-        if (const auto px = pixels_of(camera, line))
+    for (const Segment& line : grid.lines)  // with an edge that is seen on a light ground
+        if (const auto px = pixels_of(camera, line)) {
+            list.AddLine(vec((*px)[0]), vec((*px)[1]), kGridEdge, s.gui_scale + 1.5f);
             list.AddLine(vec((*px)[0]), vec((*px)[1]), kGridLine, s.gui_scale);
+        }
 }
 
 void label_at_pointer(const std::string& text, float scale) {
@@ -134,13 +138,11 @@ void draw_axis_balls(const std::array<AxisBall, 6>& balls, const std::optional<A
 
 // A window of its own, so that a click on it does not orbit.
 void draw_axes(Session& s, const Camera& camera, const WindowArea& area) {
-    const float scale = s.gui_scale;
-    const float side = 2 * (static_cast<float>(kAxisReach + kAxisBall) + 4) * scale;
-    if (static_cast<float>(area.free_width()) < 3 * side ||
-        static_cast<float>(area.free_height()) < 3 * side)
-        return;
-    const ImVec2 corner(static_cast<float>(area.width - area.right) - side - 8 * scale,
-                        static_cast<float>(area.top) + 8 * scale);
+    const float scale = s.gui_scale, margin = kAxesMargin * scale;
+    const float side = axes_side(s, area) - 2 * margin;
+    if (side <= 0) return;
+    const ImVec2 corner(static_cast<float>(area.width - area.right) - side - margin,
+                        static_cast<float>(area.top) + margin);
     ImGui::SetNextWindowPos(corner);
     ImGui::SetNextWindowSize(ImVec2(side, side));
     ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
@@ -223,6 +225,14 @@ void draw_colour_bar(const ColourBar& bar, const WindowArea& area, float scale) 
 }
 
 }  // namespace
+
+float axes_side(const Session& s, const WindowArea& area) {
+    const float side = 2 * (static_cast<float>(kAxisReach + kAxisBall) + 4) * s.gui_scale;
+    const auto wide = static_cast<float>(area.free_width()),
+               high = static_cast<float>(area.free_height());
+    if (!s.guides.axes || wide < 3 * side || high < 3 * side) return 0;
+    return side + 2 * kAxesMargin * s.gui_scale;
+}
 
 void draw_guides(Session& s, int width, int height) {
     if (!s.scene && !s.training.live) return;

@@ -137,7 +137,7 @@ void layers_panel(Session& s) {
     count_layers(s);
     for (std::size_t n = 0; n < o.splats.size() && n < s.edit.layers().size(); ++n) layer_row(n, s);
     for (const std::string& loss : o.losses) ImGui::TextWrapped("%s", loss.c_str());
-    if (ImGui::Button("Add ...")) s.ask(request::ShowOpen{true});
+    if (ImGui::Button("Add ...")) s.ask(request::ShowOpen{OpenFor::adding});
     tip("Add a scene as a layer. Files that are dropped on this list, or with Shift held, are "
         "added, too");
     const std::size_t count = s.edit.layers().size();
@@ -159,8 +159,9 @@ void layers_panel(Session& s) {
     }
     o.high.y = double{ImGui::GetCursorScreenPos().y};
     if (keeps_project(s)) {
-        path_field("project", s.project.to_save);
-        tip("Keeps layers, edits, measurements, notes, camera path and view; the splats stay in "
+        path_field(
+            "project", s.project.to_save,
+            "Keeps layers, edits, measurements, notes, camera path and view; the splats stay in "
             "their files");
         ImGui::SameLine();
         if (ImGui::Button("Save##project")) s.ask(request::SaveProject{});

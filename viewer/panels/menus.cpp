@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "viewer/commands.h"
 #include "viewer/controls.h"
@@ -24,7 +25,8 @@ void menu_item(const Command& c, Session& s) {
     tip(c.tip);
 }
 
-constexpr float kButton = 34, kLeastButton = 16, kGap = 3, kInset = 5;  // px at scale 1
+// px at scale 1; where one column would make buttons smaller than kSmall, there are two
+constexpr float kButton = 34, kSmall = 27, kLeastButton = 16, kGap = 3, kInset = 5;
 
 // What the toolbar has, and where it has a line between groups.
 constexpr std::array kTools{
@@ -38,6 +40,35 @@ constexpr std::array kGroupBegins{Key::tool_rectangle, Key::tool_move, Key::tool
 
 bool begins_group(Key id) {
     return std::ranges::find(kGroupBegins, id) != kGroupBegins.end();
+}
+
+// The rows of the toolbar: as many buttons in each as there are columns, and each group begins one.
+std::vector<std::vector<Key>> tool_rows(int columns) {
+    std::vector<std::vector<Key>> rows;
+    for (const Key id : kTools) {
+        const bool full = rows.empty() || rows.back().size() == static_cast<std::size_t>(columns);
+        if (full || begins_group(id)) rows.emplace_back();
+        rows.back().push_back(id);
+    }
+    return rows;
+}
+
+// The side of a button where there are so many columns, px.
+float button_side(int columns, float scale, float height) {
+    const auto rows = static_cast<float>(tool_rows(columns).size());
+    const float gaps = kGap * scale * (rows + 3 * static_cast<float>(kGroupBegins.size()));
+    const float room = (height - 2 * kInset * scale - gaps) / rows;
+    return std::floor(std::clamp(room, kLeastButton * scale, kButton * scale));
+}
+
+float columns_width(int columns, float scale) {
+    const auto n = static_cast<float>(columns);
+    return std::round((n * kButton + (n - 1) * kGap + 2 * kInset) * scale);
+}
+
+int tool_columns(float scale, float height, float room) {
+    const bool small = button_side(1, scale, height) < kSmall * scale;
+    return small && columns_width(2, scale) <= room ? 2 : 1;
 }
 
 void tool_button(const Command& c, float side, Session& s) {
@@ -85,15 +116,17 @@ void draw_menus(Session& s) {
     s.close_menus = false;
 }
 
-void draw_toolbar(Session& s, float top, float height) {
-    const float scale = s.gui_scale, edge = kInset * scale;
-    const float gaps = kGap * scale * static_cast<float>(kTools.size() + 3 * kGroupBegins.size());
-    const float room = height - top - 2 * edge - gaps;
-    const float wanted =
-        std::clamp(room / static_cast<float>(kTools.size()), kLeastButton * scale, kButton * scale);
-    const float side = std::max(1.0f, std::floor(wanted));
+float toolbar_width(float scale, float height, float room) {
+    return columns_width(tool_columns(scale, height, room), scale);
+}
+
+void draw_toolbar(Session& s, float top, float height, float room) {
+    const float scale = s.gui_scale, edge = kInset * scale, gap = kGap * scale;
+    const int columns = tool_columns(scale, height - top, room);
+    const float side = button_side(columns, scale, height - top);
+    const float width = columns_width(columns, scale), inside = width - 2 * edge;
     ImGui::SetNextWindowPos(ImVec2(0, top));
-    ImGui::SetNextWindowSize(ImVec2(kButton * scale + 2 * edge, std::max(height - top, 1.0f)));
+    ImGui::SetNextWindowSize(ImVec2(width, std::max(height - top, 1.0f)));
     ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(edge, edge));
     ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, ImVec2(0, kGap * scale));
     ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
@@ -102,18 +135,21 @@ void draw_toolbar(Session& s, float top, float height) {
                      ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoSavedSettings);
     ImGui::PopStyleVar(3);
     ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, ImVec2(0, kGap * scale));
-    const float left = std::floor((kButton * scale - side) / 2);
-    for (const Key id : kTools) {
-        if (begins_group(id)) {
+    const float row_width = static_cast<float>(columns) * (side + gap) - gap;
+    const float left = std::floor((inside - row_width) / 2);
+    for (const std::vector<Key>& row : tool_rows(columns)) {
+        if (begins_group(row.front())) {
             const ImVec2 at = ImGui::GetCursorScreenPos();
-            ImGui::Dummy(ImVec2(1, kGap * scale));
-            ImGui::GetWindowDrawList()->AddLine(
-                ImVec2(at.x, at.y + kGap * scale / 2),
-                ImVec2(at.x + kButton * scale, at.y + kGap * scale / 2),
-                ImGui::GetColorU32(ImGuiCol_Separator));
+            ImGui::Dummy(ImVec2(1, gap));
+            ImGui::GetWindowDrawList()->AddLine(ImVec2(at.x, at.y + gap / 2),
+                                                ImVec2(at.x + inside, at.y + gap / 2),
+                                                ImGui::GetColorU32(ImGuiCol_Separator));
         }
         ImGui::SetCursorPosX(ImGui::GetCursorPosX() + left);
-        tool_button(command(id), side, s);
+        for (const Key id : row) {
+            if (id != row.front()) ImGui::SameLine(0, gap);
+            tool_button(command(id), side, s);
+        }
     }
     ImGui::PopStyleVar();
     ImGui::End();
@@ -151,7 +187,8 @@ void recent_files(Session& s) {
 }  // namespace
 
 void draw_splash(Session& s) {
-    if (s.scene || s.training.live || s.progress.load >= 0 || s.open_dialog.shown || s.leaving)
+    if (s.scene || s.training.live || s.progress.load >= 0 || s.open_dialog.shown || s.leaving ||
+        s.train_form.shown)
         return;
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     const WindowArea area = free_area(s, static_cast<int>(size.x), static_cast<int>(size.y));
@@ -171,14 +208,21 @@ void draw_splash(Session& s) {
     ImGui::SetWindowFontScale(1.5f);
     ImGui::TextUnformatted("darb");
     ImGui::SetWindowFontScale(1);
-    ImGui::TextWrapped("Drop a scene of splats, a point cloud or a mesh on this window.");
+    ImGui::TextWrapped(s.train_form.offered()
+                           ? "Drop a scene of splats, a point cloud, a mesh, a folder of photos or "
+                             "a video on this window."
+                           : "Drop a scene of splats, a point cloud or a mesh on this window.");
     ImGui::Spacing();
     command_button(Key::open, s);
     ImGui::SameLine();
+    if (s.train_form.offered()) {
+        command_button(Key::train, s);
+        ImGui::SameLine();
+    }
     command_button(Key::help, s);
     recent_files(s);
     ImGui::Spacing();
-    ImGui::TextDisabled("What to do first, in a terminal");
+    ImGui::TextDisabled("The same in a terminal");
     for (const HeldRow& row : kFirst) {
         ImGui::TextWrapped("%s:", row.input);
         ImGui::Indent();

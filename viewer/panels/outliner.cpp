@@ -41,11 +41,11 @@ void draw_outliner(Session& s) {
     }
     if (s.mesh) row(s, Tab::mesh, "Mesh", count_text(s.mesh->mesh.face_count()) + " faces");
     if (!s.photos.views.empty())
-        row(s, Tab::camera, "Cameras", fmt::format("{} photos", s.photos.views.size()));
+        row(s, Tab::camera, "Cameras", counted(s.photos.views.size(), "photo"));
     if (const std::size_t points = s.scene ? s.edit.facts().measured.points.size() : 0; points > 0)
-        row(s, Tab::measure, "Measurement", fmt::format("{} points", points));
+        row(s, Tab::measure, "Measurement", counted(points, "point"));
     if (!s.path.path.keys.empty())
-        row(s, Tab::film, "Camera path", fmt::format("{} key frames", s.path.path.keys.size()));
+        row(s, Tab::film, "Camera path", counted(s.path.path.keys.size(), "key frame"));
     if (!s.scene && !s.training.live) ImGui::TextDisabled("Nothing is open.");
 }
 

@@ -83,10 +83,11 @@ void draw_label(const Session& s, const std::string& text, float left, float rig
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
     const WindowArea area = free_area(s, static_cast<int>(window), static_cast<int>(size_y));
     const float begin = std::max(left, static_cast<float>(area.left));
-    const float end = std::min(right, window - static_cast<float>(area.right));
-    if (begin + gap > end) return;
-    const float x =
-        std::min(begin, window - static_cast<float>(area.right) - size.x - 2 * gap) + gap;
+    const float whole = window - static_cast<float>(area.right);
+    if (begin + gap > std::min(right, whole)) return;
+    // The axes lie in the same corner.
+    const float most = whole - axes_side(s, area);
+    const float x = std::min(begin, most - size.x - 2 * gap) + gap;
     const auto free =
         std::find_if(ends.begin(), ends.end(), [&](float row_end) { return row_end <= x; });
     const float y =
@@ -145,8 +146,8 @@ void panes_panel(Session& s) {
     ImGui::Checkbox("error against the leftmost", &s.panes.difference);
     tip("Show how all other strips differ from the leftmost, as heat");
     if (s.panes.difference) {
-        ImGui::SliderFloat("error hottest at", &s.panes.difference_max, 0.005f, 1.0f,
-                           "%.3f of white", kLogarithmic);
+        slider("error hottest at", &s.panes.difference_max, 0.005f, 1.0f, "%.3f of white",
+               kLogarithmic);
         tip("The mean absolute difference of the three channels that gets the hottest colour");
     }
     const std::vector<std::string> names = pane_names(s);
@@ -169,6 +170,11 @@ ImVec2 point(const glm::dvec2& p) {
     return {static_cast<float>(p.x), static_cast<float>(p.y)};
 }
 
+void circle(ImDrawList& list, const ImVec2& centre, float radius, float scale) {
+    list.AddCircle(centre, radius, IM_COL32(0, 0, 0, 190), 0, 1.5f * scale + 2);
+    list.AddCircle(centre, radius, kStroke, 0, 1.5f * scale);
+}
+
 void draw_stroke(const Session& s, const Camera& camera) {
     const ToolState& t = s.tools;
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
@@ -176,34 +182,35 @@ void draw_stroke(const Session& s, const Camera& camera) {
         const float radius = t.brush_px * s.gui_scale;
         for (const glm::dvec2& p : t.stroke) list.AddCircleFilled(point(p), radius, kStrokeFill);
         if (!ImGui::GetIO().WantCaptureMouse)
-            list.AddCircle(ImGui::GetIO().MousePos, radius, kStroke, 0, 1.5f);
+            circle(list, ImGui::GetIO().MousePos, radius, s.gui_scale);
     }
     if (!t.drawing || t.stroke.empty()) return;
     const ImVec2 first = point(t.stroke.front()), last = point(t.stroke.back());
     if (t.tool == Tool::rectangle) {
         list.AddRectFilled(first, last, kStrokeFill);
-        list.AddRect(first, last, kStroke, 0, 0, 1.5f);
+        const ImVec2 corners[] = {first, ImVec2(last.x, first.y), last, ImVec2(first.x, last.y)};
+        outlined(list, corners, kStroke, 1.5f * s.gui_scale, true);
     } else if (t.tool == Tool::lasso) {
-        for (std::size_t i = 0; i < t.stroke.size(); ++i)
-            list.AddLine(point(t.stroke[i]), point(t.stroke[(i + 1) % t.stroke.size()]), kStroke,
-                         1.5f);
+        std::vector<ImVec2> line;
+        for (const glm::dvec2& p : t.stroke) line.push_back(point(p));
+        outlined(list, line, kStroke, 1.5f * s.gui_scale, true);
     } else if (t.tool == Tool::polygon) {
         const ImVec2 mouse = ImGui::GetIO().MousePos;
         std::vector<ImVec2> corners;
         for (const glm::dvec2& p : t.stroke) corners.push_back(point(p));
         const bool closes = closes_polygon(s, {mouse.x, mouse.y});
         corners.push_back(closes ? corners.front() : mouse);
-        list.AddPolyline(corners.data(), static_cast<int>(corners.size()), kStroke, 0, 1.5f);
+        outlined(list, corners, kStroke, 1.5f * s.gui_scale);
         for (const glm::dvec2& p : t.stroke)
             list.AddCircleFilled(point(p), 3 * s.gui_scale, kStroke);
-        list.AddCircle(first, (closes ? 8.0f : 5.0f) * s.gui_scale, kStroke, 0, 1.5f);
+        circle(list, first, (closes ? 8.0f : 5.0f) * s.gui_scale, s.gui_scale);
     } else if (t.tool == Tool::sphere && t.sphere) {
         const std::optional<glm::dvec2> at = pixel_of(camera, *t.sphere);
         if (!at) return;
         const ImVec2 centre = point(*at);
         const auto radius = static_cast<float>(glm::distance(t.stroke.front(), t.stroke.back()));
         list.AddCircleFilled(centre, radius, kStrokeFill, 64);
-        list.AddCircle(centre, radius, kStroke, 64, 1.5f);
+        circle(list, centre, radius, s.gui_scale);
     }
 }
 

@@ -7,10 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
-#include "engine/report/html.h"
 #include "viewer/gui.h"
 
 namespace darb {
@@ -18,7 +16,7 @@ namespace darb {
 namespace {
 
 // px at scale 1
-constexpr float kMenu = 23, kToolbar = 44, kSide = 350, kProgress = 340;
+constexpr float kMenu = 23, kSide = 350, kProgress = 340;
 constexpr float kOutlinerShare = 0.22f;  // of the height of the side
 constexpr float kLeastOutliner = 92, kMostOutliner = 220;
 // share of the width: panels leave that much to the picture, or else cover it
@@ -74,29 +72,35 @@ void error_window(Session& s, float width, float height) {
 void leaving_window(Session& s, float width, float height) {
     if (!s.leaving) return;
     ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), 0, ImVec2(0.5f, 0.5f));
-    ImGui::Begin("Not saved", nullptr,
+    ImGui::Begin(s.train_form.runs ? "A run goes on###leaving" : "Not saved###leaving", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
     if (unsaved_edits(s)) {
         ImGui::TextUnformatted("The edits of this scene have not been saved.");
         if (keeps_project(s)) {
-            path_field("project", s.project.to_save);
-            tip("Keeps the layers with all edits");
+            path_field("project", s.project.to_save, "Keeps the layers with all edits");
         } else {
-            path_field("file", s.save_file);
-            tip("The ending of the name decides the format");
+            path_field("file", s.save_file, "The ending of the name decides the format");
         }
     }
     if (unsaved_mesh(s)) {
         ImGui::TextUnformatted("The mesh that was made has not been saved.");
-        path_field("mesh file", s.mesh_file);
-        tip("The ending of the name decides the format");
+        path_field("mesh file", s.mesh_file, "The ending of the name decides the format");
     }
-    const bool quit = s.leaving->quit;
-    if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.ask(request::SaveAndLeave{});
-    tip("Save to the files above first");
-    ImGui::SameLine();
+    const bool quit = s.leaving->quit, saves = unsaved_edits(s) || unsaved_mesh(s);
+    if (s.train_form.runs) {
+        ImGui::PushTextWrapPos(460 * s.gui_scale);
+        ImGui::TextUnformatted(
+            "A training run goes on in this window, and would end with it. It saves its scene and "
+            "a checkpoint first, from which darb train --resume goes on.");
+        ImGui::PopTextWrapPos();
+    }
+    if (saves) {
+        if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.ask(request::SaveAndLeave{});
+        tip("Save to the files above first");
+        ImGui::SameLine();
+    }
     if (ImGui::Button(quit ? "Quit" : "Open")) s.ask(request::Leave{});
-    tip("What is not saved is lost");
+    tip(saves ? "What is not saved is lost" : "The run saves itself and ends");
     ImGui::SameLine();
     if (ImGui::Button("Stay")) s.ask(request::Stay{});
     tip("Esc");
@@ -195,6 +199,11 @@ float side_width(const Session& s, float width) {
     return std::min(kSide * s.gui_scale, kMostSide * width);
 }
 
+// px that the toolbar may take
+float toolbar_room(const Session& s, float width) {
+    return (1 - float(kLeastFree)) * width - side_width(s, width);
+}
+
 void side_panels(Session& s, float width, float height) {
     const float top = std::round(kMenu * s.gui_scale), side = std::round(side_width(s, width));
     const float outliner =
@@ -228,40 +237,6 @@ void follow_work(Session& s) {
 
 }  // namespace
 
-void path_field(const char* label, std::filesystem::path& path) {
-    char text[1024];
-    const std::string now = path.string();
-    std::strncpy(text, now.c_str(), sizeof text - 1);
-    text[sizeof text - 1] = '\0';
-    if (ImGui::InputText(label, text, sizeof text)) path = text;
-}
-
-std::string count_text(std::size_t count) {
-    return format_number(static_cast<double>(count));
-}
-
-void tip(const char* text) {
-    if (!ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
-    ImGui::PushStyleVar(ImGuiStyleVar_Alpha, 1);  // also of what is grey
-    ImGui::BeginTooltip();
-    ImGui::PushTextWrapPos(ImGui::GetFontSize() * 22);
-    ImGui::TextUnformatted(text);
-    ImGui::PopTextWrapPos();
-    ImGui::EndTooltip();
-    ImGui::PopStyleVar();
-}
-
-std::string cut_text(const std::string& text, float width) {
-    if (ImGui::CalcTextSize(text.c_str()).x <= width) return text;
-    std::string cut = text;
-    while (!cut.empty() && ImGui::CalcTextSize((cut + "...").c_str()).x > width) {
-        while (!cut.empty() && (static_cast<unsigned char>(cut.back()) & 0xC0) == 0x80)
-            cut.pop_back();  // the rest of a letter of UTF-8
-        if (!cut.empty()) cut.pop_back();
-    }
-    return cut + "...";
-}
-
 std::optional<Tab> tab_of_change(const Worked& before, const Worked& now) {
     if (now.run && !before.run) return Tab::training;
     if (now.scene != before.scene && now.scene != nullptr) return Tab::scene;
@@ -287,11 +262,12 @@ void draw_panels(Session& s) {
         draw_tools(s, w, h);
         if (s.selection.shown) draw_region(s, w, h);
         draw_menus(s);
-        draw_toolbar(s, std::round(kMenu * s.gui_scale), height);
+        draw_toolbar(s, std::round(kMenu * s.gui_scale), height, toolbar_room(s, width));
         side_panels(s, width, height);
     }
     draw_splash(s);
     progress_window(s, width, height);
+    train_window(s);
     open_window(s);
     help_window(s);
     leaving_window(s, width, height);
@@ -299,10 +275,17 @@ void draw_panels(Session& s) {
     if (s.panels) draw_toasts(s);
 }
 
+bool asks_before_quitting(const Session& s) {
+    return unsaved_edits(s) || unsaved_mesh(s) || s.train_form.runs;
+}
+
 WindowArea free_area(const Session& s, int width, int height) {
     WindowArea area{width, height};
     if (!s.panels) return area;
-    const float left = kToolbar * s.gui_scale, right = side_width(s, static_cast<float>(width));
+    const float wide = static_cast<float>(width), menu = std::round(kMenu * s.gui_scale);
+    const float left = toolbar_width(s.gui_scale, static_cast<float>(height) - menu,
+                                     toolbar_room(s, wide)),
+                right = side_width(s, wide);
     if (static_cast<float>(height) > kLeastHeight * kMenu * s.gui_scale)
         area.top = static_cast<int>(std::lround(kMenu * s.gui_scale));
     if (static_cast<float>(width) - left - right < kLeastFree * width) return area;

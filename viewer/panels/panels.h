@@ -4,8 +4,10 @@
 
 #include <imgui.h>
 
+#include <span>
 #include <string>
 
+#include "engine/core/count_text.h"
 #include "viewer/gui.h"
 #include "viewer/input.h"
 #include "viewer/session.h"
@@ -42,7 +44,13 @@ void performance_panel(Session& session);
 void draw_outliner(Session& session);
 /// Menus at the top, and the column of buttons on the left.
 void draw_menus(Session& session);
-void draw_toolbar(Session& session, float top, float height);
+void draw_toolbar(Session& session, float top, float height, float room);
+/// Its width, px: of two columns where one would make the buttons small and two fit into `room`,
+/// what the picture can spare. height: of the toolbar.
+float toolbar_width(float gui_scale, float height, float room);
+/// The side of the square in the upper right corner of the picture that the axes take, with its
+/// margins, px; 0 where they are not drawn.
+float axes_side(const Session& session, const WindowArea& area);
 /// A button of a command, with its tip.
 void command_button(Key id, Session& session);
 /// The photos as small pictures, in what is left of the panel; a click looks through the camera of
@@ -63,11 +71,10 @@ inline ImU32 axis_colour(int axis) {
     return colour_u32(theme::theme_colour(palette::kAxes[static_cast<std::size_t>(axis)]));
 }
 
-/// With separated thousands.
-std::string count_text(std::size_t count);
-
 /// The text, cut at its end so that it is at most this wide, px.
 std::string cut_text(const std::string& text, float width);
+/// The same, cut at its beginning.
+std::string cut_beginning(const std::string& text, float width);
 /// Explains the control before it while the pointer rests on it.
 void tip(const char* text);
 
@@ -81,13 +88,26 @@ void draw_measurement(const Session& session, int width, int height);
 /// Shows messages for some seconds.
 void draw_toasts(const Session& session);
 void open_window(Session& session);
+/// The form that begins a training run.
+void train_window(Session& session);
 /// Chooses which kernels are side by side.
 void panes_panel(Session& session);
 
 /// The region's outline over the picture, in ImGui's coordinates.
 void draw_region(const Session& session, int width, int height);
 
-/// A text field for a path.
-void path_field(const char* label, std::filesystem::path& path);
+/// A text field for a path. While nobody types, it shows the end of a path that is too long. tip:
+/// what the field is for; the whole path stands below it where it is cut.
+void path_field(const char* label, std::filesystem::path& path, const char* tip);
+
+/// Sliders whose value stays readable: a bar at the lower edge of the field shows where it is.
+bool slider(const char* label, float* value, float least, float most, const char* format,
+            ImGuiSliderFlags flags);
+bool slider(const char* label, int* value, int least, int most, const char* format,
+            ImGuiSliderFlags flags);
+
+/// A line over the picture that is seen on white and on black.
+void outlined(ImDrawList& list, std::span<const ImVec2> line, ImU32 colour, float width,
+              bool closed = false);
 
 }  // namespace darb

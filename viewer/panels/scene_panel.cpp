@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/data/image_io.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/report/html.h"
@@ -85,11 +86,11 @@ void display_panel(Session& s) {
     tip("The picture; its difference from the photo; the depth, where near is light; or how many "
         "splats each pixel needs. A bar in the picture says what the colours mean");
     if (d.mode == VIEW_ERROR) {
-        ImGui::SliderFloat("lightest at", &d.error_max, 0.02f, 1.0f, "%.2f of white", kLogarithmic);
+        slider("lightest at", &d.error_max, 0.02f, 1.0f, "%.2f of white", kLogarithmic);
         tip("The mean absolute difference of the three channels that gets the lightest colour");
     }
     if (d.mode == VIEW_COUNT) {
-        ImGui::SliderFloat("lightest at", &d.count_max, 10, 10'000, "%.0f splats", kLogarithmic);
+        slider("lightest at", &d.count_max, 10, 10'000, "%.0f splats", kLogarithmic);
         tip("The number of splats per pixel, counted until it is opaque, that gets the lightest "
             "colour");
     }
@@ -128,17 +129,33 @@ namespace fs = std::filesystem;
 
 void go_to(const fs::path& folder, OpenDialog& dialog) {
     dialog.folder = folder.has_filename() ? folder : folder.parent_path();
-    dialog.entries = list_folder(dialog.folder);
+    dialog.entries = list_folder(dialog.folder, dialog.purpose);
 }
 
 void choose(const fs::path& file, Session& s) {
-    s.ask(request::Open{file, s.open_dialog.merges});
-    s.open_dialog.shown = false;
+    OpenDialog& dialog = s.open_dialog;
+    dialog.shown = false;
+    if (dialog.purpose == OpenFor::training)
+        s.ask(request::ShowTrain{file});
+    else
+        s.ask(request::Open{file, dialog.purpose == OpenFor::adding});
+}
+
+// "24 photos", for the folder that is shown; counted once for each.
+std::string photos_in(OpenDialog& dialog) {
+    if (dialog.counted != dialog.folder) {
+        dialog.counted = dialog.folder;
+        dialog.photos = 0;
+        std::error_code none;
+        for (const fs::directory_entry& entry : fs::directory_iterator(dialog.folder, none))
+            dialog.photos += is_photo_name(entry.path()) ? 1 : 0;
+    }
+    return dialog.photos == 0 ? "no photos in it" : counted(dialog.photos, "photo") + " in it";
 }
 
 void recent_scenes(Session& s) {
     OpenDialog& dialog = s.open_dialog;
-    if (dialog.recent.empty()) return;
+    if (dialog.recent.empty() || dialog.purpose == OpenFor::training) return;
     ImGui::TextDisabled("recently opened");
     for (std::size_t i = 0; i < dialog.recent.size(); ++i) {
         const fs::path file = dialog.recent[i];
@@ -164,7 +181,10 @@ void folder_entries(Session& s) {
         else
             choose(dialog.folder / entry.name, s);
     }
-    if (entries.empty()) ImGui::TextDisabled("This folder has no scene and no other folder");
+    if (entries.empty())
+        ImGui::TextDisabled(dialog.purpose == OpenFor::training
+                                ? "This folder has no other folder and no video"
+                                : "This folder has no scene and no other folder");
 }
 
 }  // namespace
@@ -184,20 +204,29 @@ void open_window(Session& s) {
                             ImVec2(0.5f, 0.5f));
     ImGui::SetNextWindowSize(ImVec2(std::min(size.x, 520 * unit), std::min(size.y, 520 * unit)),
                              ImGuiCond_Appearing);
-    ImGui::Begin(dialog.merges ? "Add a scene###open" : "Open a scene###open", &dialog.shown,
-                 ImGuiWindowFlags_NoCollapse);
+    const bool trains = dialog.purpose == OpenFor::training;
+    ImGui::Begin(trains                              ? "Choose photos, a video or a data set###open"
+                 : dialog.purpose == OpenFor::adding ? "Add a scene###open"
+                                                     : "Open a scene###open",
+                 &dialog.shown, ImGuiWindowFlags_NoCollapse);
     if (ImGui::Button("Up")) go_to(dialog.folder.parent_path(), dialog);
     tip("Go to the parent folder");
     ImGui::SameLine();
     fs::path typed = dialog.folder;
     ImGui::SetNextItemWidth(-FLT_MIN);
-    path_field("##folder", typed);
-    tip("The folder; type or paste a path");
+    path_field("##folder", typed, "The folder; type or paste a path");
     if (typed != dialog.folder) go_to(typed, dialog);
-    ImGui::BeginChild("entries", ImVec2(0, 0), true);
+    const float foot = trains ? ImGui::GetFrameHeightWithSpacing() : 0;
+    ImGui::BeginChild("entries", ImVec2(0, -foot), true);
     recent_scenes(s);
     folder_entries(s);
     ImGui::EndChild();
+    if (trains) {
+        if (ImGui::Button("Use this folder")) choose(dialog.folder, s);
+        tip("The folder above, with its photos and, where there are some, its cameras");
+        ImGui::SameLine();
+        ImGui::TextDisabled("%s", photos_in(dialog).c_str());
+    }
     ImGui::End();
 }
 

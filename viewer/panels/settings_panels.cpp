@@ -135,7 +135,7 @@ void camera_panel(Session& s) {
     command_button(Key::picture, s);
     if (s.photos.current < 0) {
         float degrees = static_cast<float>(glm::degrees(s.navigation.fov_y));
-        if (ImGui::SliderFloat("field of view", &degrees, 10, 120, "%.0f°", kClamped))
+        if (slider("field of view", &degrees, 10, 120, "%.0f°", kClamped))
             s.navigation.fov_y = glm::radians(static_cast<double>(degrees));
         tip("The angle over the whole height of the window, in degrees");
         float speed = static_cast<float>(s.fly_speed);
@@ -146,7 +146,7 @@ void camera_panel(Session& s) {
             "while flying");
         up_axis(s);
     }
-    ImGui::SliderFloat("near", &s.display.near_plane, 0.001f, 10, "%.3f units", kLogarithmic);
+    slider("near", &s.display.near_plane, 0.001f, 10, "%.3f units", kLogarithmic);
     tip("Splats nearer to the camera are not drawn; in units of the scene");
     data_set(s);
 }
@@ -193,8 +193,8 @@ void path_panel(Session& s) {
     if (ImGui::Button(p.playing ? "Stop" : "Play")) p.playing = !p.playing;
     tip("Fly along the path (space)");
     float at = static_cast<float>(p.at_s);
-    if (ImGui::SliderFloat("time", &at, 0, static_cast<float>(std::max(p.path.duration(), 0.01)),
-                           "%.2f s", kClamped) &&
+    if (slider("time", &at, 0, static_cast<float>(std::max(p.path.duration(), 0.01)), "%.2f s",
+               kClamped) &&
         !p.path.keys.empty()) {
         p.at_s = at;
         s.ask(request::LeavePhoto{});
@@ -202,19 +202,19 @@ void path_panel(Session& s) {
     }
     tip("The camera's place on the path, in seconds");
     ImGui::EndDisabled();
-    ImGui::SliderFloat("per key frame", &p.seconds_per_key, 0.2f, 10, "%.1f s", kClamped);
+    slider("per key frame", &p.seconds_per_key, 0.2f, 10, "%.1f s", kClamped);
     tip("Time from the last key frame to the one that is added next");
-    path_field("path file", p.file);
-    tip("A JSON file that darb render --path and darb view --path read, too");
+    path_field("path file", p.file,
+               "A JSON file that darb render --path and darb view --path read, too");
     if (ImGui::Button("Load")) s.ask(request::LoadPath{});
     tip("Replace the key frames by those of the path file");
     ImGui::SameLine();
     ImGui::BeginDisabled(p.path.keys.empty());
     if (ImGui::Button("Save path")) s.ask(request::SavePath{});
     tip("Write the key frames to the path file");
-    path_field("folder", p.folder);
-    tip("The folder of the exported frames; it is made if it does not exist");
-    ImGui::SliderInt("frames", &p.fps, 1, 120, "%d a second", kClamped);
+    path_field("folder", p.folder,
+               "The folder of the exported frames; it is made if it does not exist");
+    slider("frames", &p.fps, 1, 120, "%d a second", kClamped);
     tip("Frame rate of the exported video");
     int size[2] = {p.export_width, p.export_height};
     if (ImGui::InputInt2("size, px", size)) {

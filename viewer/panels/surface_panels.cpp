@@ -32,7 +32,7 @@ void how_shown(Session& s) {
         "faces");
     if (d.mesh != MeshShow::both) return;
     float percent = 100 * d.mesh_nearer;
-    if (ImGui::SliderFloat("bring forward", &percent, 0, 10, "%.1f %% of the depth", kLogarithmic))
+    if (slider("bring forward", &percent, 0, 10, "%.1f %% of the depth", kLogarithmic))
         d.mesh_nearer = percent / 100;
     tip("How much nearer than it is the mesh counts; splats whose centre is behind it are hidden");
 }
@@ -68,16 +68,16 @@ void make_one(Session& s) {
 
 void mesh_panel(Session& s) {
     if (s.mesh) {
-        ImGui::Text("%zu faces%s%s", s.mesh->mesh.face_count(), s.mesh->file.empty() ? "" : ", ",
-                    s.mesh->file.filename().string().c_str());
+        ImGui::Text("%s faces%s%s", count_text(s.mesh->mesh.face_count()).c_str(),
+                    s.mesh->file.empty() ? "" : ", ", s.mesh->file.filename().string().c_str());
         for (const std::string& note : s.mesh->notes) ImGui::TextWrapped("%s", note.c_str());
         how_shown(s);
     } else {
         ImGui::TextWrapped("Drop a mesh on the window, or make one.");
     }
     make_one(s);
-    path_field("file", s.mesh_file);
-    tip(("The ending of the name decides the format: " + mesh_endings()).c_str());
+    path_field("file", s.mesh_file,
+               ("The ending of the name decides the format: " + mesh_endings()).c_str());
     if (ImGui::Button("Open mesh")) s.ask(request::OpenMesh{s.mesh_file});
     tip("Show the mesh of this file with the scene");
     ImGui::BeginDisabled(!s.mesh);

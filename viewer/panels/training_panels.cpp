@@ -29,8 +29,7 @@ std::string time_text(double seconds) {
 }
 
 std::string count_of(double number) {
-    if (number < 1e4) return fmt::format("{:.0f}", number);
-    return number < 1e6 ? fmt::format("{:.1f} k", number / 1e3)
+    return number < 1e6 ? count_text(static_cast<std::uint64_t>(number))
                         : fmt::format("{:.2f} M", number / 1e6);
 }
 
@@ -44,8 +43,11 @@ void how_far(const TrainingCurves& t) {
     const float share = t.last_iteration > 0
                             ? static_cast<float>(t.iteration) / static_cast<float>(t.last_iteration)
                             : 0;
-    ImGui::ProgressBar(share, ImVec2(-FLT_MIN, 0),
-                       fmt::format("iteration {} of {}", t.iteration, t.last_iteration).c_str());
+    ImGui::ProgressBar(
+        share, ImVec2(-FLT_MIN, 0),
+        fmt::format("iteration {} of {}", count_text(static_cast<std::uint64_t>(t.iteration)),
+                    count_text(static_cast<std::uint64_t>(t.last_iteration)))
+            .c_str());
     if (!ImGui::BeginTable("cards", 3)) return;
     card("time left", t.finished           ? "finished"
                       : t.paused           ? "paused"
@@ -201,7 +203,7 @@ void training_panel(Session& s) {
 
 namespace {
 
-constexpr int kThumbColumns = 4;
+constexpr int kThumbColumns = 4, kNameColumns = 2;
 constexpr float kLeastThumbs = 120;  // px at scale 1: height of the list
 constexpr float kThumbGap = 4;       // px at scale 1
 
@@ -227,9 +229,9 @@ void draw_pixels(ImDrawList& list, const Thumbnail& t, const ImVec2& at, const I
                 uv, t.pixels[static_cast<std::size_t>(y * w + x)]);
 }
 
-void thumbnail_button(Session& s, std::size_t v, float side) {
+void thumbnail_button(Session& s, std::size_t v, const ImVec2& box) {
     const View& view = s.photos.views[v];
-    const ImVec2 at = ImGui::GetCursorScreenPos(), box(side, 0.75f * side);
+    const ImVec2 at = ImGui::GetCursorScreenPos();
     ImGui::PushID(static_cast<int>(v));
     if (ImGui::InvisibleButton("photo", box)) s.ask(request::ChooseCamera{static_cast<int>(v)});
     const bool hovered = ImGui::IsItemHovered();
@@ -247,9 +249,9 @@ void thumbnail_button(Session& s, std::size_t v, float side) {
         draw_pixels(list, *thumbnail,
                     ImVec2(at.x + (box.x - size.x) / 2, at.y + (box.y - size.y) / 2), size);
     } else {
-        const std::string name = cut_text(view.name, side - 6);
-        list.AddText(ImVec2(at.x + 3, at.y + 3), ImGui::GetColorU32(ImGuiCol_TextDisabled),
-                     name.c_str());
+        const std::string name = cut_text(view.name, box.x - 6 * s.gui_scale);
+        list.AddText(ImVec2(at.x + 3 * s.gui_scale, at.y + 3 * s.gui_scale),
+                     ImGui::GetColorU32(ImGuiCol_TextDisabled), name.c_str());
     }
     const bool current = s.photos.current == static_cast<int>(v);
     if (current || hovered)
@@ -264,19 +266,25 @@ void camera_thumbnails(Session& s) {
     ImGui::BeginChild("thumbnails", ImVec2(0, std::max(ImGui::GetContentRegionAvail().y,
                                                        kLeastThumbs * s.gui_scale)));
     const float gap = kThumbGap * s.gui_scale;
+    // Cameras whose photos nobody knows are a list of names.
+    const bool photos =
+        std::ranges::any_of(s.photos.views, [](const View& view) { return !view.photo.empty(); });
+    const int columns = photos ? kThumbColumns : kNameColumns;
     const float side =
-        std::floor((ImGui::GetContentRegionAvail().x - (kThumbColumns - 1) * gap) / kThumbColumns);
+        std::floor((ImGui::GetContentRegionAvail().x - static_cast<float>(columns - 1) * gap) /
+                   static_cast<float>(columns));
+    const ImVec2 box(side, photos ? 0.75f * side : ImGui::GetTextLineHeight() + 6 * s.gui_scale);
     ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, ImVec2(gap, gap));
-    const int rows = (static_cast<int>(s.photos.views.size()) + kThumbColumns - 1) / kThumbColumns;
+    const int rows = (static_cast<int>(s.photos.views.size()) + columns - 1) / columns;
     ImGuiListClipper clipper;
-    clipper.Begin(rows, 0.75f * side + gap);
+    clipper.Begin(rows, box.y + gap);
     while (clipper.Step())
         for (int row = clipper.DisplayStart; row < clipper.DisplayEnd; ++row)
-            for (int column = 0; column < kThumbColumns; ++column) {
-                const auto v = static_cast<std::size_t>(row * kThumbColumns + column);
+            for (int column = 0; column < columns; ++column) {
+                const auto v = static_cast<std::size_t>(row * columns + column);
                 if (v >= s.photos.views.size()) break;
                 if (column > 0) ImGui::SameLine();
-                thumbnail_button(s, v, side);
+                thumbnail_button(s, v, box);
             }
     clipper.End();
     ImGui::PopStyleVar();
