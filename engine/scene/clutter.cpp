@@ -92,12 +92,11 @@ class Extents {
     void join_all(std::size_t i, UnionFind& sets) const {
         const Extent& e = extents_[i];
         const double larger = kMostTimesLarger * e.largest;
-        std::vector<std::pair<std::uint32_t, double>> found;
-        tree_.radiusSearch(&e.mean[0], kTouch2 * (e.largest * e.largest + larger * larger), found,
-                           nanoflann::SearchParams(32, 0, false));
-        for (const auto& [j, distance2] : found)
+        const double reach2 = kTouch2 * (e.largest * e.largest + larger * larger);
+        for_each_within(tree_, e.mean, reach2, [&](std::uint32_t j) {
             if (sets.find(j) != sets.find(static_cast<std::uint32_t>(i)) && touch(e, extents_[j]))
                 sets.join(static_cast<std::uint32_t>(i), j);
+        });
     }
 
   private:

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <nanoflann.hpp>
+#include <utility>
 #include <vector>
 
 namespace darb {
@@ -26,5 +27,19 @@ struct PointsView {
 using PointTree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointsView>,
                                         PointsView, 3>;
+
+/// Calls visit(index) for each point within this squared distance of a place, in no order.
+template <class Visit>
+void for_each_within(const PointTree& tree, const glm::dvec3& place, double distance2,
+                     const Visit& visit) {
+#if NANOFLANN_VERSION >= 0x150
+    std::vector<nanoflann::ResultItem<std::uint32_t, double>> found;
+    tree.radiusSearch(&place[0], distance2, found, nanoflann::SearchParameters(0, false));
+#else
+    std::vector<std::pair<std::uint32_t, double>> found;
+    tree.radiusSearch(&place[0], distance2, found, nanoflann::SearchParams(32, 0, false));
+#endif
+    for (const auto& item : found) visit(item.first);
+}
 
 }  // namespace darb
