@@ -36,8 +36,8 @@ struct ViewerOptions {
     /// Finds cameras that lie beside a scene, for one that is dropped. Without such a function the
     /// views stay. What it throws becomes a note.
     std::function<std::vector<View>(const std::filesystem::path&)> find_cameras;
-    /// Whether a run can train on what lies there: a folder of photos, a data set, a video. Empty:
-    /// nobody knows.
+    /// Whether a run can train on what lies there: a folder of photos, a data set, a video. Without
+    /// such a function nothing counts as one of these.
     std::function<bool(const std::filesystem::path&)> trains_on;
     /// Whether a scene with cameras opens at the first one, with its photo where there is one.
     bool start_at_camera = false;
@@ -81,7 +81,7 @@ class Document {
         return options_.trains_on && options_.trains_on(path);
     }
 
-    /// Closes the scene that is shown, whatever of it is not saved, and takes the cameras of a run.
+    /// Closes the scene that is shown, even with unsaved edits, and takes the cameras of a run.
     void make_room_for_run(std::vector<View> views);
     /// The pictures must stay where they are until end_run.
     void follow_run(LivePicture& pictures, const Bounds& bounds, const LiveScene& scene);

@@ -42,9 +42,9 @@ struct TrainForm {
     std::string error;  // that belongs to no field
     TrainOutlook outlook;
     bool starts = false;   // the user wants the run to begin
-    bool cancels = false;  // and that it does not, while it is prepared
+    bool cancels = false;  // the user wants to end it while it is prepared
     std::string stage;     // what a run does before its first iteration; empty: there is none
-    bool runs = false;     // a run of this window goes on, and ends with it
+    bool runs = false;     // a run that this window began goes on; it ends with the window
 
     bool offered() const { return !fields.empty(); }
     bool has_error() const {

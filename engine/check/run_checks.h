@@ -69,7 +69,7 @@ std::vector<Row> run_checks(Device& device, const CheckOptions& options, const O
 std::vector<Row> check_kernels(Device& device, std::optional<int> kernel = std::nullopt);
 std::vector<Row> check_scan_and_sort(Device& device);
 std::vector<Row> check_loss(Device& device);
-/// arithmetic: of the blends, ARITHMETIC_*; fast16 has tolerances of its own.
+/// arithmetic: ARITHMETIC_* of the blends; fast16 has tolerances of its own.
 std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int evaluation,
                             bool float_alone = false, int arithmetic = ARITHMETIC_FLOAT32);
 

@@ -238,8 +238,9 @@ struct ShaderNeed {
 /// Each capability once, in order of its number. Aborts on one that this file does not know, as no
 /// device could be held to it.
 std::vector<ShaderNeed> shader_needs(std::span<const ShaderBinary> shaders);
-/// The needs of all shaders in the embedded table, which is read once per process; without those
-/// for which a device need not have the shader (DeviceInfo::half_arithmetic).
+/// The needs of all shaders in the embedded table, which is read once per process. What only
+/// shaders of half precision need is left out, as a device may lack it
+/// (DeviceInfo::half_arithmetic).
 const std::vector<ShaderNeed>& needs_of_all_shaders();
 
 /// Turns on what these needs and this project's own Vulkan calls take, nothing else: robust access,

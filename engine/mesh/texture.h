@@ -82,7 +82,7 @@ struct SeamLevels {
     double before = 0, after = 0;  // mean difference of the two photos along seams, levels
 };
 /// Least squares over all seams at once (Lempitsky and Ivanov 2007). Differences that are too large
-/// for one of exposure count less. Reads each photo that has a seam once. Throws Error where the
+/// to come from exposure count less. Reads each photo that has a seam once. Throws Error where the
 /// choice is for another number of faces.
 SeamLevels level_seams(const TriangleMesh& mesh, const PhotoViews& views,
                        const PhotoChoice& choice);

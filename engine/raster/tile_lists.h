@@ -19,7 +19,7 @@ class TileLists {
     /// Whether a device can count so many intersections of so many tiles: a counter for each tile
     /// must fit into shared memory, and the table of counts into a binding.
     static bool fits(const DeviceInfo& info, std::uint32_t intersections, std::uint32_t tiles);
-    /// Device memory that it takes, bytes: about 4 for each intersection and each 8,192 tiles.
+    /// Device memory that it takes, bytes: 4 for each tile and each block of 8,192 intersections.
     static std::uint64_t device_bytes(std::uint32_t intersections, std::uint32_t tiles);
 
     /// Both are the most that record() takes, and fit.

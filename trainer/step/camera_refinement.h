@@ -58,7 +58,7 @@ class CameraRefinement {
 
     /// Whether shutters are trained: from the start, or since a state with them was restored.
     bool shutters() const { return shutters_; }
-    /// A state() without shutters, with ones that are trained from then on and begin still.
+    /// The same state() with shutters added, which begin still and are trained from then on.
     std::vector<float> with_shutters(const std::vector<float>& state) const;
 
     CameraMoves moves() const;

@@ -23,8 +23,8 @@ namespace darb {
 /// The camera of a photo whose sides are divided and rounded: it sees the same.
 Camera divided(const Camera& camera, double divisor);
 
-/// For each training view, in order, which of the exposures is its own: one a photo, as the six
-/// faces of a panorama are one photo; numbered as they come.
+/// The number of each training view's exposure, in the order of the views. A photo has one
+/// exposure, and the six faces of a panorama are one photo.
 std::vector<std::uint32_t> exposure_numbers(const std::vector<View>& views);
 /// How many exposures there are.
 std::uint32_t exposure_count(const std::vector<View>& views);

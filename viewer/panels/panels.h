@@ -45,8 +45,8 @@ void draw_outliner(Session& session);
 /// Menus at the top, and the column of buttons on the left.
 void draw_menus(Session& session);
 void draw_toolbar(Session& session, float top, float height, float room);
-/// Its width, px: of two columns where one would make the buttons small and two fit into `room`,
-/// what the picture can spare. height: of the toolbar.
+/// The width of the toolbar, px. It has two columns where one would make the buttons small and two
+/// fit into `room`, which is what the picture can spare. height: of the toolbar.
 float toolbar_width(float gui_scale, float height, float room);
 /// The side of the square in the upper right corner of the picture that the axes take, with its
 /// margins, px; 0 where they are not drawn.
