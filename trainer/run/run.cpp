@@ -656,16 +656,7 @@ void Run::report_probes() {
     for (; told_probes_ < trainer_.probes().size(); ++told_probes_) {
         const Trainer::Probe& p = trainer_.probes()[told_probes_];
         log_.probe(trainer_.iteration(), p);
-        const bool shutter = p.effect == EFFECT_SHUTTER;
-        const std::string reason = !std::isnan(p.gain_db)
-                                       ? fmt::format("{:+.3f} dB on photos set aside", p.gain_db)
-                                   : p.admitted && p.degree > 1 ? "follows the first"
-                                   : p.admitted || shutter      ? "too few photos to set some aside"
-                                                                : "--max-memory has no room for it";
-        const std::string what =
-            shutter ? "rolling shutters" : fmt::format("colour of degree {}", p.degree);
-        progress_.note(fmt::format("iteration {}: {} {} ({})", p.iteration, what,
-                                   p.admitted ? "admitted" : "refused", reason));
+        progress_.note(probe_text(p));
     }
 }
 

@@ -178,6 +178,19 @@ void RunLog::resolution(int iteration, int divisor) {
     write({{"event", "resolution"}, {"iteration", iteration}, {"divisor", divisor}});
 }
 
+std::string probe_text(const Trainer::Probe& probe) {
+    const bool shutter = probe.effect == EFFECT_SHUTTER;
+    const std::string reason = !std::isnan(probe.gain_db)
+                                   ? fmt::format("{:+.3f} dB on photos set aside", probe.gain_db)
+                               : probe.admitted && probe.degree > 1 ? "follows the first"
+                               : probe.admitted || shutter ? "too few photos to set some aside"
+                                                           : "--max-memory has no room for it";
+    return fmt::format(
+        "iteration {}: {} {} ({})", probe.iteration,
+        shutter ? "rolling shutters" : fmt::format("colour of degree {}", probe.degree),
+        probe.admitted ? "admitted" : "refused", reason);
+}
+
 void RunLog::probe(int iteration, const Trainer::Probe& probe) {
     write({{"event", "probe"},
            {"iteration", iteration},
@@ -185,7 +198,8 @@ void RunLog::probe(int iteration, const Trainer::Probe& probe) {
            {"effect", effect_name(probe.effect)},
            {"degree", probe.degree},
            {"gain_db", probe.gain_db},
-           {"admitted", probe.admitted}});
+           {"admitted", probe.admitted},
+           {"text", probe_text(probe)}});
 }
 
 void RunLog::growth_stopped(int iteration, const char* limit, std::uint32_t splats) {
@@ -339,6 +353,9 @@ ReportData RunLog::report_data(const TrainResult& summary) const {
     data.pictures = summary.pictures;
     for (const Json& note : start_.value("notes", Json::array()))
         data.notes.push_back(note.get<std::string>());
+    for (const Json& e : events_)
+        if (e.value("event", "") == "probe" && e.contains("text"))  // earlier versions have none
+            data.notes.push_back(e.value("text", ""));
     return data;
 }
 

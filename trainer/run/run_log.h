@@ -26,6 +26,9 @@ std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
 /// null, as JSON has NaN and infinity, becomes NaN, which the report leaves out of its curves.
 void add_events(const std::vector<nlohmann::json>& events, ReportData& data);
 
+/// What a probe found, in a line.
+std::string probe_text(const Trainer::Probe& probe);
+
 class RunLog {
   public:
     /// Touches nothing before begin() or go_on().

@@ -248,6 +248,32 @@ TEST(EffectPlanOfDataset, surfaces_are_asked_for_by_name_alone) {
     }
 }
 
+TEST(EffectPlanOfDataset, shutters_are_tried_where_cameras_are_refined_and_nobody_decided) {
+    const Capture c;
+    const auto row = [&](const char* words) {
+        return plan_training(c.dataset, c.photos, 0, parse_effects(words)).row(EFFECT_SHUTTER);
+    };
+    EXPECT_FALSE(row("auto").tried) << "cameras stay as they are";
+    EXPECT_TRUE(row("+cameras").tried);
+    EXPECT_FALSE(row("+cameras").on);
+    EXPECT_TRUE(row("all,+cameras").tried);
+    EXPECT_FALSE(row("none,+cameras").tried);
+    EXPECT_FALSE(row("+cameras,-shutter").tried);
+    EXPECT_FALSE(row("+cameras,+shutter").tried);
+    EXPECT_TRUE(row("+cameras,+shutter").on);
+    Capture known;
+    known.dataset.views[0].camera.shutter = {true, {0, 0.01, 0}, {}};
+    const EffectPlan plan =
+        plan_training(known.dataset, known.photos, 0, parse_effects("+cameras"));
+    EXPECT_TRUE(plan.on(EFFECT_SHUTTER));
+    EXPECT_FALSE(plan.row(EFFECT_SHUTTER).tried) << "the file has the motion";
+    Capture panoramas;
+    for (View& view : panoramas.dataset.views) view.face = 0;
+    EXPECT_FALSE(plan_training(panoramas.dataset, panoramas.photos, 0, parse_effects("+cameras"))
+                     .row(EFFECT_SHUTTER)
+                     .tried);
+}
+
 AntialiasProbe probe_of(std::vector<ProbedSize> sizes) {
     return {400, {}, {}, std::move(sizes)};
 }
