@@ -85,13 +85,15 @@ void draw_label(const Session& s, const std::string& text, float left, float rig
     const float begin = std::max(left, static_cast<float>(area.left));
     const float whole = window - static_cast<float>(area.right);
     if (begin + gap > std::min(right, whole)) return;
-    // The axes lie in the same corner.
-    const float most = whole - axes_side(s, area);
-    const float x = std::min(begin, most - size.x - 2 * gap) + gap;
-    const auto free =
-        std::find_if(ends.begin(), ends.end(), [&](float row_end) { return row_end <= x; });
-    const float y =
-        static_cast<float>(area.top) + gap + float(free - ends.begin()) * (size.y + 2 * gap);
+    // The axes lie in the same corner: a label that would reach them stands below.
+    const float axes = axes_side(s, area), row_height = size.y + 2 * gap;
+    const bool below = axes > 0 && begin + size.x + 2 * gap > whole - axes;
+    const auto first = below ? static_cast<std::size_t>(std::ceil(axes / row_height)) : 0;
+    if (ends.size() < first) ends.resize(first, 0);
+    const float x = std::min(begin, whole - size.x - 2 * gap) + gap;
+    const auto free = std::find_if(ends.begin() + std::ptrdiff_t(first), ends.end(),
+                                   [&](float row_end) { return row_end <= x; });
+    const float y = static_cast<float>(area.top) + gap + float(free - ends.begin()) * row_height;
     if (free == ends.end())
         ends.push_back(x + size.x + gap);
     else
