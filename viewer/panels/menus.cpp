@@ -58,7 +58,7 @@ float button_side(int columns, float scale, float height) {
     const auto rows = static_cast<float>(tool_rows(columns).size());
     const float gaps = kGap * scale * (rows + 3 * static_cast<float>(kGroupBegins.size()));
     const float room = (height - 2 * kInset * scale - gaps) / rows;
-    return std::floor(std::clamp(room, kLeastButton * scale, kButton * scale));
+    return std::max(1.0f, std::floor(std::clamp(room, kLeastButton * scale, kButton * scale)));
 }
 
 float columns_width(int columns, float scale) {
