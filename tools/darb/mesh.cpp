@@ -334,8 +334,9 @@ std::string report_text(const MeshFlags& flags, const SceneMesh& result, double 
                             100 * share(r.texture->unseen_faces, result.mesh.face_count()));
     if (r.texture) text += "\n";
     if (r.texture && r.texture->seam_levels)
-        text += fmt::format("seams: photos differ by {:.1f} of 255 levels there, levelled {:.1f}\n",
-                            (*r.texture->seam_levels)[0], (*r.texture->seam_levels)[1]);
+        text += fmt::format(
+            "seams: photos differ by {:.1f} of 255 levels there, by {:.1f} once levelled\n",
+            (*r.texture->seam_levels)[0], (*r.texture->seam_levels)[1]);
     return text + fmt::format("{} vertices, {} faces\n", count_text(result.mesh.vertex_count()),
                               count_text(result.mesh.face_count()));
 }
@@ -602,9 +603,11 @@ void add_cleaning_options(CLI::App& c, MeshFlags& flags, OptionGroups& groups) {
             ->check(above_zero())
             ->needs(texture));
     groups.surface.push_back(
-        c.add_option("--seams", flags.seams,
-                     "where one photo ends and the next begins: level changes the colours of both "
-                     "smoothly until they meet; keep leaves them as they were taken")
+        c.add_option(
+             "--seams", flags.seams,
+             "with --texture photos, where one photo ends and the next begins: level changes "
+             "the colours of both smoothly until they meet; keep leaves them as they were "
+             "taken")
             ->capture_default_str()
             ->check(CLI::IsMember({"level", "keep"}))
             ->needs(texture));
