@@ -85,6 +85,8 @@ Device::State::State(const DeviceOptions& options, bool validation)
     if (faults.no_half) info.half_arithmetic = false;
     if (faults.own_subgroups) info.requires_subgroup_size = false;
     keep_subgroup_sizes(info);
+    // Its blends need what BackwardBlend::pixels needs.
+    if (lanes_by_pixels(info, info.subgroup_size) == 0) info.half_arithmetic = false;
     info.max_storage_buffer_bytes =
         std::min(info.max_storage_buffer_bytes, info.max_allocation_bytes);
     tuning = usual_tuning(info);

@@ -45,16 +45,16 @@ bool blends_in_half(const ForwardOptions& options) {
 }
 
 std::uint32_t half_blend_lanes(const Device& device) {
-    if (!device.info().half_arithmetic)
-        throw Error("arithmetic fast16",
-                    fmt::format("{} has no arithmetic in half precision (shaderFloat16)",
-                                device.info().name),
-                    "Use --arithmetic float32, or choose another device (darb devices).");
     const std::uint32_t lanes = lanes_by_pixels(device.info(), blend_subgroup(device));
     if (lanes == 0)
         throw Error("arithmetic fast16",
                     fmt::format("it needs subgroups of 32 lanes or fewer and 32 KiB of shared "
                                 "memory, which {} has not",
+                                device.info().name),
+                    "Use --arithmetic float32, or choose another device (darb devices).");
+    if (!device.info().half_arithmetic)
+        throw Error("arithmetic fast16",
+                    fmt::format("{} has no arithmetic in half precision (shaderFloat16)",
                                 device.info().name),
                     "Use --arithmetic float32, or choose another device (darb devices).");
     return lanes;
