@@ -59,7 +59,7 @@ TEST(PredictSplats, is_bounded_by_pixels_start_and_limit) {
 TEST(PredictSplats, only_the_region_grows) {
     const Dataset scene = small_scene();
     TrainOptions options;
-    Device device(test_device_options());
+    Device device(test::device_options());
     const auto wanted = [&] {
         return wanted_splats(device, scene, options, kManyPixels, initial_count(scene, options));
     };
