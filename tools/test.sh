@@ -28,7 +28,7 @@ esac
 logs=$(mktemp -d) && trap 'rm -rf "$logs"' EXIT
 passed=0 failed=0 skipped=0 failures=()
 build() { # PRESET [TARGET...]: goes on after an error, so that all errors are shown
-    cmake --preset "$1" >"$logs/configure" 2>&1 || { cat "$logs/configure"; return 1; }
+    cmake --preset "$1" -DDARB_WERROR=ON >"$logs/configure" 2>&1 || { cat "$logs/configure"; return 1; }
     cmake --build --preset "$1" -j "$(nproc)" ${2:+--target "${@:2}"} -- -k 0
 }
 run_tests() { # BUILD LABEL [OPTION...]: tests start one thread per core themselves, so two at a time are enough

@@ -11,7 +11,7 @@ ASan:
 
     cmake -B build-python-asan -G Ninja -DCMAKE_CXX_COMPILER=g++ -DCMAKE_BUILD_TYPE=Debug \
         -DCMAKE_CXX_FLAGS_DEBUG=-O1 -DCMAKE_UNITY_BUILD=ON -DDARB_SANITIZE=address \
-        -DDARB_PYTHON=ON -DDARB_WERROR=OFF
+        -DDARB_PYTHON=ON
     cmake --build build-python-asan --target darb_python
     LD_PRELOAD="$(g++ -print-file-name=libasan.so) $(g++ -print-file-name=libstdc++.so)" \
         ASAN_OPTIONS=detect_leaks=0 \

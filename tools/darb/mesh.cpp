@@ -178,21 +178,21 @@ nlohmann::json distances_json(const DistanceStatistics& d) {
 }
 
 nlohmann::json comparison_json(const MeshComparison& c) {
-    nlohmann::json json{{"accuracy", distances_json(c.accuracy)}};
-    if (std::isfinite(c.bias)) json["bias"] = c.bias;
-    if (std::isfinite(c.normal_degrees)) json["normal_degrees"] = c.normal_degrees;
-    nlohmann::json& scores = json["f_scores"] = nlohmann::json::array();
+    nlohmann::json object{{"accuracy", distances_json(c.accuracy)}};
+    if (std::isfinite(c.bias)) object["bias"] = c.bias;
+    if (std::isfinite(c.normal_degrees)) object["normal_degrees"] = c.normal_degrees;
+    nlohmann::json& scores = object["f_scores"] = nlohmann::json::array();
     for (const FScore& f : c.f_scores)
         scores.push_back({{"threshold", f.threshold}, {"precision", f.precision}});
-    if (c.completeness.samples == 0) return json;  // shapes, which have no samples
+    if (c.completeness.samples == 0) return object;  // shapes, which have no samples
     for (std::size_t i = 0; i < scores.size(); ++i) {
         scores[i]["recall"] = c.f_scores[i].recall;
         scores[i]["f"] = c.f_scores[i].f();
     }
-    json["completeness"] = distances_json(c.completeness);
-    json["chamfer"] = c.chamfer;
-    json["left_out_share"] = c.left_out_share;
-    return json;
+    object["completeness"] = distances_json(c.completeness);
+    object["chamfer"] = c.chamfer;
+    object["left_out_share"] = c.left_out_share;
+    return object;
 }
 
 std::string comparison_text(const MeshComparison& c) {
@@ -273,39 +273,39 @@ std::string alignment_text(const Alignment& a) {
 nlohmann::json report_json(const MeshFlags& flags, const SceneMesh& result,
                            double metres_per_unit) {
     const SceneMeshReport& r = result.report;
-    nlohmann::json json{{"output", name_in_json(flags.json, flags.output)},
-                        {"vertices", result.mesh.vertex_count()},
-                        {"faces", result.mesh.face_count()},
-                        {"voxel", r.tsdf.voxel},
-                        {"farthest", r.tsdf.farthest},
-                        {"method", flags.method},
-                        {"depth", kDepthReadings[static_cast<std::size_t>(flags.mesh.reading)]},
-                        {"level", flags.mesh.level},
-                        {"views", r.views},
-                        {"surface_share", share(r.depths.surfaces, r.depths.pixels)},
-                        {"confirmed_share", share(r.depths.kept, r.depths.surfaces)},
-                        {"blocks", r.tsdf.blocks},
-                        {"ranges", r.tsdf.ranges},
-                        {"thin_share", r.thin_share},
-                        {"raw_faces", r.raw_faces},
-                        {"parts", r.clean.parts - r.clean.parts_removed},
-                        {"parts_removed", r.clean.parts_removed},
-                        {"holes_filled", r.clean.holes_filled},
-                        {"holes_left", r.clean.holes_left}};
-    if (metres_per_unit > 0) json["metres_per_unit"] = metres_per_unit;
-    if (r.simplified_by) json["simplified_by"] = *r.simplified_by;
+    nlohmann::json object{{"output", name_in_json(flags.json, flags.output)},
+                          {"vertices", result.mesh.vertex_count()},
+                          {"faces", result.mesh.face_count()},
+                          {"voxel", r.tsdf.voxel},
+                          {"farthest", r.tsdf.farthest},
+                          {"method", flags.method},
+                          {"depth", kDepthReadings[static_cast<std::size_t>(flags.mesh.reading)]},
+                          {"level", flags.mesh.level},
+                          {"views", r.views},
+                          {"surface_share", share(r.depths.surfaces, r.depths.pixels)},
+                          {"confirmed_share", share(r.depths.kept, r.depths.surfaces)},
+                          {"blocks", r.tsdf.blocks},
+                          {"ranges", r.tsdf.ranges},
+                          {"thin_share", r.thin_share},
+                          {"raw_faces", r.raw_faces},
+                          {"parts", r.clean.parts - r.clean.parts_removed},
+                          {"parts_removed", r.clean.parts_removed},
+                          {"holes_filled", r.clean.holes_filled},
+                          {"holes_left", r.clean.holes_left}};
+    if (metres_per_unit > 0) object["metres_per_unit"] = metres_per_unit;
+    if (r.simplified_by) object["simplified_by"] = *r.simplified_by;
     if (r.texture) {
-        json["texture"] = {
+        object["texture"] = {
             {"of", flags.texture}, {"pages", r.texture->pages}, {"texel", r.texture->texel}};
         if (flags.mesh.texture == MeshTexturing::photos) {
-            json["texture"]["unseen_faces"] = r.texture->unseen_faces;
-            json["texture"]["seams"] = r.texture->seams;
+            object["texture"]["unseen_faces"] = r.texture->unseen_faces;
+            object["texture"]["seams"] = r.texture->seams;
             if (const auto& levels = r.texture->seam_levels)
-                json["texture"]["seam_levels"] = {{"before", (*levels)[0]},
-                                                  {"after", (*levels)[1]}};
+                object["texture"]["seam_levels"] = {{"before", (*levels)[0]},
+                                                    {"after", (*levels)[1]}};
         }
     }
-    return json;
+    return object;
 }
 
 std::string report_text(const MeshFlags& flags, const SceneMesh& result, double metres_per_unit) {

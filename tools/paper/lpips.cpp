@@ -144,7 +144,8 @@ constexpr const char* kSaveWeights =
     "Save the state_dict of lpips.LPIPS, or that of torchvision's net together with the package's "
     "lin layers, as safetensors, each tensor cloned (docs/paper.md has the lines).";
 
-const Tensor& tensor_of(const Tensors& tensors, const std::vector<std::string>& names,
+/// The first of these that is there.
+const Tensor& tensor_of(const Tensors& tensors, std::vector<std::string> names,
                         const std::string& where) {
     for (const std::string& name : names)
         if (const auto found = tensors.find(name); found != tensors.end()) return found->second;

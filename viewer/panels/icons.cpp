@@ -52,8 +52,8 @@ class Pen {
     void arrow(const ImVec2& from, const ImVec2& to) {
         const float dx = to.x - from.x, dy = to.y - from.y, l = std::hypot(dx, dy);
         const float ux = dx / l, uy = dy / l;
-        constexpr float kHead = 0.36f, kHalf = 0.22f;
-        const ImVec2 foot(to.x - kHead * ux, to.y - kHead * uy);
+        constexpr float kTip = 0.36f, kHalf = 0.22f;
+        const ImVec2 foot(to.x - kTip * ux, to.y - kTip * uy);
         lines({from, foot});
         fill(to, {foot.x - kHalf * uy, foot.y + kHalf * ux},
              {foot.x + kHalf * uy, foot.y - kHalf * ux});
