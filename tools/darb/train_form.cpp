@@ -59,6 +59,7 @@ void add_choices(const RequestOption& option, TrainField& field) {
     if (option.row.is_switch) {
         field.choices = {"on", "off"};
     } else if (field.name == "--preset") {
+        field.usual = kRunPresets.back().name;
         for (const RunPreset& preset : kRunPresets) {
             field.choices.emplace_back(preset.name);
             field.notes.push_back(
