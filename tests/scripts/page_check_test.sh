@@ -13,7 +13,7 @@ source "$(dirname "$0")/check.sh"
 
 check help 'tools/page_check.py SCENE' "$("$root/tools/page_check.py" --help)"
 text=$("$darb" train "$root/assets/scene" -r 8 -q --iterations 60 --html -o "$folder/run" 2>&1) || { echo "$text"; exit 1; }
-check 'darb train --html' '^page +.*scene\.html: [0-9]+ splats' "$text"
+check 'darb train --html' '^page +.*scene\.html: [0-9,]+ splats' "$text"
 check 'the page of a run' '"name":' "$(cat "$folder/run/scene.html")"
 text=$("$root/tools/page_check.py" "run=$folder/run" --darb "$darb" --kernels raised_cosine --views 2 --size 120x90 \
     --turn 0 --cuts 6 --least-exact 99 --least-merged 15 2>&1)

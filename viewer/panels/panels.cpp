@@ -110,6 +110,7 @@ void leaving_window(Session& s, float width, float height) {
 struct TabRow {
     Tab tab;
     const char* name;
+    const char* tip;
     void (*draw)(Session&);
     bool (*there)(const Session&);
 };
@@ -138,14 +139,17 @@ void view_tab(Session& s) {
 }
 
 constexpr TabRow kTabs[] = {
-    {Tab::training, "Training", training_panel, [](const Session& s) { return s.training.live; }},
-    {Tab::scene, "Scene", scene_tab, [](const Session& s) { return !s.training.live || s.scene; }},
-    {Tab::view, "View", view_tab, kAlways},
-    {Tab::camera, "Camera", camera_panel, kAlways},
-    {Tab::splats, "Splats", edit_panel, kWithScene},
-    {Tab::mesh, "Mesh", mesh_panel, kWithScene},
-    {Tab::measure, "Measure", measure_tab, kWithScene},
-    {Tab::film, "Film", path_panel, kAlways},
+    {Tab::training, "Training", "How the run goes, and what of it may change", training_panel,
+     [](const Session& s) { return s.training.live; }},
+    {Tab::scene, "Scene", "Open, save, publish; layers", scene_tab,
+     [](const Session& s) { return !s.training.live || s.scene; }},
+    {Tab::view, "View", "What is drawn, and how accurately", view_tab, kAlways},
+    {Tab::camera, "Camera", "Where the picture is seen from; photos and their cameras",
+     camera_panel, kAlways},
+    {Tab::splats, "Splats", "Select, clean up and edit splats", edit_panel, kWithScene},
+    {Tab::mesh, "Mesh", "A surface from the splats, or from a file", mesh_panel, kWithScene},
+    {Tab::measure, "Measure", "Lengths, areas, scale and notes", measure_tab, kWithScene},
+    {Tab::film, "Film", "A path of the camera, as a film", path_panel, kAlways},
 };
 
 const TabRow& shown_tab(const Session& s) {
@@ -172,6 +176,7 @@ void tab_buttons(Session& s, const TabRow& shown) {
         if (on)
             ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
         if (ImGui::Button(row.name, ImVec2(width, 0))) s.tab = row.tab;
+        tip(row.tip);
         if (on) ImGui::PopStyleColor();
     }
     ImGui::Separator();
