@@ -10,6 +10,7 @@
 #include <numbers>
 #include <thread>
 
+#include "engine/core/count_text.h"
 #include "engine/data/image_io.h"
 #include "engine/data/metrics.h"
 #include "engine/data/point_cloud_ply.h"
@@ -425,7 +426,8 @@ TEST(Convert, a_pipe_takes_the_scene_and_stderr_what_is_said) {
     EXPECT_EQ(o.code, 0) << o.err;
     EXPECT_EQ(o.out, "");
     EXPECT_NE(o.err.find("--crop 0,-9,-9,9,9,9: "), std::string::npos) << o.err;
-    EXPECT_NE(o.err.find(fmt::format("{} bytes", got.size())), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find(fmt::format("{} bytes", count_text(got.size()))), std::string::npos)
+        << o.err;
     EXPECT_GT(parse_splats(got, "pipe").size(), 0u);
 }
 

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "engine/core/count_text.h"
 #include "engine/core/error.h"
 #include "engine/data/point_cloud_ply.h"
 #include "engine/scene/edit_splats.h"
@@ -147,8 +148,9 @@ TEST_F(RunFiles, what_is_too_transparent_to_be_drawn_is_not_saved) {
     EXPECT_EQ(load_splats(run() / "point_cloud" / "iteration_4" / "point_cloud.ply").size(), saved);
     EXPECT_EQ(read_checkpoint(run() / "chkpnt4.darb").state.model.size(), all)
         << "a run goes on with all of them";
-    EXPECT_NE(o.out.find(fmt::format("drawn {} were left out, and 0 had left", undrawn)),
-              std::string::npos)
+    EXPECT_NE(
+        o.out.find(fmt::format("drawn {} were left out, and 0 had left", count_text(undrawn))),
+        std::string::npos)
         << o.out;
 }
 
