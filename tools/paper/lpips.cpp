@@ -144,11 +144,11 @@ constexpr const char* kSaveWeights =
     "Save the state_dict of lpips.LPIPS, or that of torchvision's net together with the package's "
     "lin layers, as safetensors, each tensor cloned (docs/paper.md has the lines).";
 
-/// The first of these that is there.
-const Tensor& tensor_of(const Tensors& tensors, std::vector<std::string> names,
+/// The first of these that is there; never null.
+const Tensor* tensor_of(const Tensors& tensors, const std::vector<std::string>& names,
                         const std::string& where) {
     for (const std::string& name : names)
-        if (const auto found = tensors.find(name); found != tensors.end()) return found->second;
+        if (const auto found = tensors.find(name); found != tensors.end()) return &found->second;
     throw Error(where, "has no tensor " + names.front(), kSaveWeights);
 }
 
@@ -284,14 +284,14 @@ Lpips::Lpips(const std::vector<std::filesystem::path>& files, const LpipsOptions
 
 Lpips::Lpips(const Tensors& tensors, const std::string& where, const LpipsOptions& options)
     : options_(options) {
-    const Tensor& first = tensor_of(tensors, trunk_names(kAlexNet[0], "weight"), where);
+    const Tensor& first = *tensor_of(tensors, trunk_names(kAlexNet[0], "weight"), where);
     net_ = first.shape.size() == 4 && first.shape[2] == 11 ? LpipsNet::alexnet : LpipsNet::vgg16;
     const bool alexnet = net_ == LpipsNet::alexnet;
     const std::span<const Row> rows = alexnet ? std::span<const Row>(kAlexNet) : kVgg16;
     std::size_t channels = 3;
     for (const Row& row : rows) {
-        const Tensor& weight = tensor_of(tensors, trunk_names(row, "weight"), where);
-        const Tensor& bias = tensor_of(tensors, trunk_names(row, "bias"), where);
+        const Tensor& weight = *tensor_of(tensors, trunk_names(row, "weight"), where);
+        const Tensor& bias = *tensor_of(tensors, trunk_names(row, "bias"), where);
         const std::size_t side = !alexnet || row.index > 3 ? 3 : row.index == 0 ? 11 : 5;
         if (weight.shape.size() != 4 || weight.shape[1] != channels || weight.shape[2] != side ||
             weight.shape[3] != side || bias.data.size() != weight.shape[0])
@@ -303,8 +303,8 @@ Lpips::Lpips(const Tensors& tensors, const std::string& where, const LpipsOption
         channels = weight.shape[0];
         if (!row.kept) continue;
         const std::string head = fmt::format("lin{}.model.1.weight", heads_.size());
-        const Tensor& lin =
-            tensor_of(tensors, {head, fmt::format("lins.{}.model.1.weight", heads_.size())}, where);
+        const Tensor& lin = *tensor_of(
+            tensors, {head, fmt::format("lins.{}.model.1.weight", heads_.size())}, where);
         if (lin.data.size() != channels)
             throw Error(where + ", tensor " + head,
                         fmt::format("it has {} values for {} channels", lin.data.size(), channels),
