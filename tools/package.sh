@@ -19,7 +19,7 @@ kinds=${*:-deb portable}
 for kind in $kinds; do
     [[ $kind == deb || $kind == portable ]] || { echo "package.sh: no such package: $kind (deb, portable)" >&2; exit 2; }
 done
-for tool in dpkg-source:dpkg-dev python3:python3 fakeroot:fakeroot; do
+for tool in dpkg-source:dpkg-dev python3:python3 fakeroot:fakeroot file:file; do
     command -v "${tool%:*}" >/dev/null || { echo "package.sh: ${tool%:*} is missing (apt install ${tool#*:})" >&2; exit 2; }
 done
 jobs=${JOBS:-$(nproc)}

@@ -70,6 +70,7 @@ python   pybind11-dev         the Python module; optional
 python   python3-numpy        its arrays; optional
 torch    python3-torch        tests of LPIPS and of darb.torch, which skip without it; optional
 packaging dpkg-dev           tools/package.sh: libraries of packages, sources of Debian
+packaging file               tools/package.sh: which files are programs
 packaging fakeroot           tools/package.sh: owners of files
 packaging python3            tools/package.sh: man pages and completion
 packaging xz-utils           tools/package.sh: the archive
