@@ -105,6 +105,25 @@ constexpr std::size_t kSplats = 20'000;
 constexpr int kDegree = 3, kSide = 256;
 constexpr double kNamedSplats = 1e6, kNamedPixels = 1e6, kIntersectionsOfASplat = 6;
 
+enum class FrameDepth { without, with };
+
+void compile_frame(Device& device, const ForwardOptions& options, FrameDepth depth) {
+    const Camera camera = bench_camera(glm::dvec3(0, 0, 4), true, kSide, kSide);
+    FrameBuffers buffers(device, options);
+    Forward forward(device, options);
+    const SplatModel model = random_scene(64, kDegree);
+    GpuSplats splats(device, model, false);
+    const Buffer cameras = upload_cameras(device, {camera_data(camera, model.origin)});
+    const FrameView view{camera_data(camera, model.origin), &cameras, 0, kDegree, glm::vec3(0)};
+    buffers.reserve(splats.count(), splats.count() * 4, kSide, kSide);
+    Commands commands(device);
+    commands.begin();
+    forward.record(commands, splats, view, buffers.frame());
+    if (depth == FrameDepth::with)
+        forward.record_depth(commands, splats.count(), view, buffers.frame());
+    commands.submit_and_wait();
+}
+
 // Frames at every degree that training passes through, with room for huge splats, long lists and
 // depth.
 void compile_frames(Device& device) {
@@ -113,18 +132,7 @@ void compile_frames(Device& device) {
         BenchStep(device, random_scene(64, degree), camera);
     ForwardOptions options;
     options.huge_splat_path = HugeSplatPath::always;
-    FrameBuffers buffers(device, options);
-    Forward forward(device, options);
-    const SplatModel model = random_scene(64, kDegree);
-    GpuSplats splats(device, model, false);
-    const Buffer cameras = upload_cameras(device, {camera_data(camera, model.origin)});
-    const FrameView view{camera_data(camera, model.origin), &cameras, 0, kDegree, glm::vec3(0)};
-    buffers.reserve(splats.count(), splats.count() * 4, kSide, kSide);
-    Commands commands(device);
-    commands.begin();
-    forward.record(commands, splats, view, buffers.frame());
-    forward.record_depth(commands, splats.count(), view, buffers.frame());
-    commands.submit_and_wait();
+    compile_frame(device, options, FrameDepth::with);
     const Upsample upsample(device);
 }
 
@@ -133,22 +141,11 @@ void compile_half(Device& device) {
     if (!device.info().half_arithmetic ||
         lanes_by_pixels(device.info(), blend_subgroup(device)) == 0)
         return;
-    const Camera camera = bench_camera(glm::dvec3(0, 0, 4), true, kSide, kSide);
     ForwardOptions options;
     options.store_for_backward = true;
     options.arithmetic = ARITHMETIC_FAST16;
-    FrameBuffers buffers(device, options);
-    Forward forward(device, options);
+    compile_frame(device, options, FrameDepth::without);
     const BlendBackward backward(device, options);
-    const SplatModel model = random_scene(64, kDegree);
-    GpuSplats splats(device, model, false);
-    const Buffer cameras = upload_cameras(device, {camera_data(camera, model.origin)});
-    const FrameView view{camera_data(camera, model.origin), &cameras, 0, kDegree, glm::vec3(0)};
-    buffers.reserve(splats.count(), splats.count() * 4, kSide, kSide);
-    Commands commands(device);
-    commands.begin();
-    forward.record(commands, splats, view, buffers.frame());
-    commands.submit_and_wait();
 }
 
 void compile_training(Device& device) {

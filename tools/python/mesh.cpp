@@ -100,6 +100,9 @@ SceneMeshOptions take_options(const py::dict& options, const glm::dvec3& origin,
     const std::string seams = take_text(options["seams"], "seams");
     if (seams != "level" && seams != "keep")
         throw Error("seams " + seams, "no such way", "Use level or keep.");
+    if (seams == "keep" && o.texture != MeshTexturing::photos)
+        throw Error("seams keep", "only photos have seams",
+                    "Take texture photos, or leave seams out.");
     o.level_seams = seams == "level";
     return o;
 }
