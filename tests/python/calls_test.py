@@ -419,6 +419,8 @@ class Meshes(unittest.TestCase):
     def test_what_is_wrong_is_told(self):
         for options, said in (({"depth": "deep"}, "no such reading"),
                               ({"texture": "photos"}, "there are no photos"),
+                              ({"seams": "blend"}, "no such way"),
+                              ({"texture": "splats", "seams": "keep"}, "only photos have seams"),
                               ({"bounds": (1, 1, 1, 0, 2, 2)}, "hold nothing"),
                               ({"bounds": (1, 2, 3)}, "has 3 numbers"),
                               ({"align": "rigid"}, "without a reference"),
